@@ -275,7 +275,7 @@ def _points(collection, ax: Axes) -> dict[str, Any]:
 def _bundle(segments, collection, ax: Axes) -> dict[str, Any]:
     """Read many straight lines as one curve with gaps."""
     gap = np.full((1, 2), np.nan)
-    joined = np.concatenate([np.concatenate([segment, gap]) for segment in segments] or [gap])
+    joined = np.concatenate([np.concatenate([np.reshape(segment, (-1, 2)), gap]) for segment in segments] or [gap])
     line = {"color": _colour(collection.get_colors()), "width": _width(collection.get_linewidths()[0])}
     return {"mode": "lines", "line": line, **_coordinates(joined[:, 0], joined[:, 1], ax), **_name(collection)}
 

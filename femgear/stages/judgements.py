@@ -377,6 +377,8 @@ def _against(results: Any, stages: Sequence[str]) -> Iterator[str]:
         yield "teeth part"
     if any("back_contact" in part and float(part["back_contact"].max()) > 0.0 for part in data):
         yield "teeth press on their back flanks"
+    if any(finding.code == "W-TAIL" and finding.severity == DOUBT for finding in results.findings):
+        yield "dynamic forces need a longer excitation"
     unstable = any("stable" in part and bool((part["stable"].values == 0).any()) for part in data)
     if unstable or codes & {"W-UNSTABLE", "W-GROWTH"}:
         yield "motions are not stable"

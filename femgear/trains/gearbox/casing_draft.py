@@ -72,12 +72,12 @@ def draft_casing(case: GearboxCase) -> tuple[str, tuple[Finding, ...]]:
         "inertia": [INERTIA.show(float(f"{value:.4g}")) for value in inertia],
         "foot": feet,
     }
-    tables: dict[str, Any] = {"casing": casing, "sensor": list(_sensors(middle, top, high, down, -sense))}
+    tables: dict[str, Any] = {"casing": casing, "sensor": list(_sensors(case, (middle, top, high), down, -sense))}
     if not case.runup.count:
         tables["runup"] = {"count": _SPEEDS}
     text = (
-        f"a rigid casing of {casing['mass']} on four feet of {_stiffness(stiffness[down])}, and three sensors, are "
-        "estimated from the sizes of shafts and gears"
+        f"a rigid casing of {casing['mass']} on four feet of {_stiffness(stiffness[down])}, and sensors, are estimated "
+        "from the sizes of shafts and gears"
     )
     finding = Finding("W-ESTIMATED", "casing", text, remedy="give mass, feet and sensors of your own, or a casing file")
     return case_text.write(tables, remarks), (finding,)
@@ -126,14 +126,13 @@ def _down(case: GearboxCase) -> tuple[int, float]:
     return (0, math.copysign(1.0, x)) if abs(x) > abs(y) else (1, math.copysign(1.0, y))
 
 
-def _sensors(middle: np.ndarray, top: np.ndarray, high: np.ndarray, down: int, up: float):
-    """Sensors in the middle of the upper wall, of one beside and of the right end."""
-    side = 1 - down
-    for name, axis, place, sign in (
-        ("top", down, top[down], up),
-        ("side", side, high[side], 1.0),
-        ("end", 2, high[2], 1),
-    ):
+def _sensors(case: GearboxCase, corners: tuple[np.ndarray, np.ndarray, np.ndarray], down: int, up: float):
+    """Sensors in the middle of the upper wall, of one beside and, where anything moves along the axes, of an end."""
+    side, (middle, top, high) = 1 - down, corners
+    walls = [("top", down, top[down], up), ("side", side, high[side], 1.0)]
+    if case.motions == "space":
+        walls.append(("end", 2, high[2], 1.0))
+    for name, axis, place, sign in walls:
         position = middle.copy()
         position[axis] = place
         yield {"name": name, "position": _lengths(position), "direction": f"{'-' * (sign < 0)}{'xyz'[axis]}"}

@@ -31,7 +31,7 @@ from femgear.stages.key_figures import REFERENCE_ACCELERATION
 from femgear.stages.strength import OF_ROOTS
 from femgear.stages.strength_results import SYMBOLS, taken_as_one
 from femgear.trains.gearbox.mode_words import nearest_mode
-from femgear.trains.gearbox.response_results import line_origin
+from femgear.trains.gearbox.response_results import line_origin, main_way
 from femgear.trains.gearbox.strength import least_safety
 
 _RESPONSES = "dynamics", "runup", "balance", "transient"
@@ -137,9 +137,7 @@ def _noise(results: Any) -> Judgement:
     )
     sentence = f"At {speed:,.4g} rpm {name} has {_level(whole)}: {main}"
     if "path_share" in data:
-        share = data["path_share"].values[0, :, sensor]
-        way = int(share.argmax())
-        sentence += f"; {share[way]:.0%} comes by {data['path'].values[way]}"
+        sentence += f"; most of it comes by {main_way(data, sensor)}"
     if "runup" in results.stages and "level" in results.runup:
         over = results.runup["level"].values.max(axis=1)
         at = int(over.argmax())

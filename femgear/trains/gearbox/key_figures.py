@@ -36,7 +36,7 @@ from femgear.trains.gearbox.stress import stresses_wanted, why_no_stress
 
 _RESPONSES = (("", "dynamics"), ("run-up ", "runup"))
 """Words before the figures of a response, and its stage."""
-_OF_FORCES = "W-PULL", "W-TAIL", "W-CROSS", "W-STEPS"
+_OF_FORCES = "W-PULL", "W-TAIL", "W-EXCITATION", "W-CROSS", "W-STEPS"
 """Codes of the findings that concern mesh forces of a response."""
 
 

@@ -29,7 +29,9 @@ _CHANGE = 0.5
 _CROSS = 0.05
 """Force by the stiffness of a stage on the motion of another one, over its dynamic force, that is told."""
 _TAIL = 0.05
-"""Share of mesh forces at the outer side bands that is told."""
+"""Share of mesh forces at the outer side bands, and of K_v in the upper half of the excitation, that is told."""
+_CANCELS = 1.5
+"""Share of one way in the power of a level beyond which others cancel it."""
 _KINDS = ("sun", "ring")
 
 
@@ -310,6 +312,27 @@ def _change(found: GearboxResponse, moved: dict[str, np.ndarray]) -> np.ndarray:
         return np.where(whole > 0.0, 20.0 * np.log10(whole / less), 0.0)
 
 
+def _end_of_excitation(data: xr.Dataset) -> tuple[str, str]:
+    """Entry that ends the excitation, and what to do about it."""
+    few = bool(data.attrs.get("most_harmonics"))
+    return ("dynamics.mesh_harmonics", "more of them") if few else ("dynamics.up_to", "a higher frequency")
+
+
+def _short_excitation(data: xr.Dataset, number: int, stage: str) -> Iterator[Finding]:
+    """Tell the speed at which K_v of a stage rests most on the upper half of its excitation (W-TAIL)."""
+    factor = np.nanmax(data["dynamic_factor"].values[:, number], axis=1, initial=1.0)
+    share = (factor - 1.0) * data["tail"].values[:, number] / factor
+    at = int(np.argmax(share))
+    if share[at] > _TAIL:
+        key, remedy = _end_of_excitation(data)
+        text = (
+            f"the upper half of the excitation, to {_reach(data)}, makes {data['tail'].values[at, number]:.0%} of the "
+            f"fluctuation of the mesh forces of {stage} at {data['speed'].values[at]:.5g} rpm: K_v {factor[at]:.3g} "
+            "changes with what lies beyond"
+        )
+        yield Finding("W-TAIL", key, text, remedy=remedy)
+
+
 def gearbox_response_warnings(data: xr.Dataset) -> Iterator[Finding]:
     """List what dynamics.nc or runup.nc says against itself."""
     stages, speeds = [str(name) for name in data["stage"].values], data["speed"].values
@@ -323,6 +346,7 @@ def gearbox_response_warnings(data: xr.Dataset) -> Iterator[Finding]:
         if outer.max() > _TAIL:
             text = f"{outer.max():.2g} of the mesh forces of {stage} are at the outermost side bands"
             yield Finding("W-TAIL", "dynamics.side_bands", text, remedy="more of them")
+        yield from _short_excitation(data, number, stage)
     if "level_change" in data:
         change = np.nan_to_num(np.abs(data["level_change"].values), posinf=0.0)
         if change.max(initial=0.0) > _CHANGE:
@@ -331,9 +355,8 @@ def gearbox_response_warnings(data: xr.Dataset) -> Iterator[Finding]:
                 f"the upper half of the excitation, to {_reach(data)}, changes the level of "
                 f"{data['sensor'].values[sensor]} at {speeds[speed]:.5g} rpm by {change.max():.2g} dB"
             )
-            few = bool(data.attrs.get("most_harmonics"))
-            key, remedy = ("mesh_harmonics", "more of them") if few else ("up_to", "a higher frequency")
-            yield Finding("W-EXCITATION", f"dynamics.{key}", text, remedy=remedy)
+            key, remedy = _end_of_excitation(data)
+            yield Finding("W-EXCITATION", key, text, remedy=remedy)
     if "cross_excitation" in data and data["cross_excitation"].max() > _CROSS:
         yield _cross_finding(data)
     if missed := int(data.attrs.get("unresolved_resonances", 0)):
@@ -460,6 +483,18 @@ def _lines(data: xr.Dataset, at: int, sensor: int) -> Block:
         quiet = data["line_without_friction"].values[at, sensor]
         columns["without friction [m/s^2]"] = lambda i: f"{quiet[i]:.4g}"
     return tabulate(f"Largest lines at {data['sensor'].values[sensor]}", chosen, columns)
+
+
+def main_way(data: xr.Dataset, sensor: int) -> str:
+    """Name the way by which most of the level at a sensor comes at the first speed, with its share of the power.
+
+    Of ways that cancel one another shares say nothing.
+    """
+    share = data["path_share"].values[0, :, sensor]
+    way, name = int(share.argmax()), str(data["path"].values[int(share.argmax())])
+    if share[way] > _CANCELS:
+        return f"{name}, but {data['path'].values[int(share.argmin())]} takes most of that away"
+    return f"{name} ({share[way]:.0%} of the power)"
 
 
 def line_origin(data: xr.Dataset, line: int) -> str:

@@ -250,6 +250,8 @@ def _planet_factor(state: Deflection, stage: StageModel) -> float:
     shares = [share for name, share in flow.torque_shares.items() if name in beside]
     if shares and isinstance(stage.section, PairSection) and stage.section.carrier is not None:
         return len(shares) * max(shares)
+    if not flow.first_torque(stage.section):
+        return math.nan  # idle: what planets weigh is no load to share
     force = state.mesh_force[list(stage.meshes)[: len(stage.planets)]]
     return float(force.max() / force.mean()) if len(force) and force.any() else math.nan
 
@@ -583,6 +585,10 @@ def gearbox_warnings(case: GearboxCase) -> Iterator[Finding]:
     if not case.deflection.contact and any(stage.teeth is not None for stage in (*case.pair, *case.planetary)):
         text = "without contact meshes have the stiffness of ISO 6336-1, and no K_Hbeta"
         yield Finding("W-STIFFNESS", "deflection.contact", text, remedy="leave it out")
+    if case.modes.damping_ratio == 0.0 and case.transient is None:
+        text = "0, no damping at all: near resonances levels and forces have no limit, and mean nothing"
+        remedy = "gear trains are commonly computed with 0.02 to 0.05"
+        yield Finding("W-DAMPING", "modes.damping_ratio", text, remedy=remedy)
     yield from _given_planets(case)
     yield from casing_notices(case)
     yield from sensor_notices(case)

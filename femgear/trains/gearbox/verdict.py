@@ -21,7 +21,7 @@ from femgear.stages.planet_bearings import planet_bearing_rows
 from femgear.trains.gearbox.casing_results import largest_foot_force
 from femgear.trains.gearbox.life import shortest_life
 from femgear.trains.gearbox.mode_words import mesh_lines_and_modes, nearest_mode
-from femgear.trains.gearbox.response_results import line_origin
+from femgear.trains.gearbox.response_results import line_origin, main_way
 from femgear.trains.gearbox.strength import smallest_safeties
 from femgear.trains.gearbox.stress import box_reason_rows
 
@@ -141,9 +141,7 @@ def _heard(data: Any, modes: Any, marks: Marks) -> Iterator[tuple[str, str]]:
         if whole > 0.0 and "lines_real" in data:
             yield f"main line at {name}", _main_line(data, sensor, whole, modes)
         if whole > 0.0 and "path_share" in data:
-            share = data["path_share"].values[0, :, sensor]
-            at = int(share.argmax())
-            yield f"most of it at {name} comes by", f"{data['path'].values[at]} ({share[at]:.0%} of the power)"
+            yield f"most of it at {name} comes by", main_way(data, sensor)
     yield from _forces(data, "largest mesh force over its mean", marks, "dynamics")
 
 
@@ -161,7 +159,7 @@ def _forces(data: Any, name: str, marks: Marks, stage: str) -> Iterator[tuple[st
     if not np.isfinite(factor).any():
         return
     speed, number, _ = np.unravel_index(int(np.nanargmax(factor)), factor.shape)
-    text = marks(f"{np.nanmax(factor):.3f}", *_OF_RESPONSE, of=(stage,))
+    text = marks(f"{np.nanmax(factor):.3f}", "W-EXCITATION", *_OF_RESPONSE, of=(stage,))
     yield name, f"{text}, {data['stage'].values[number]} at {float(data['speed'].values[speed]):.5g} rpm"
 
 

@@ -1,5 +1,7 @@
 """An estimated casing: walls around all parts, feet below, and a gearbox that makes a sound with it."""
 
+import tomllib
+
 import numpy as np
 import pytest
 from small_gearbox import pair_tables, planetary_tables
@@ -76,3 +78,9 @@ def test_nothing_with_a_size_has_no_casing():
     with pytest.raises(CaseError) as refused:
         draft_casing(read_case(tables))
     assert refused.value.code == "E-KEY-MISSING"
+
+
+def test_a_plane_gearbox_has_no_sensor_along_its_axes():
+    case = read_case(pair_tables() | {"motions": "plane"})
+    made = tomllib.loads(draft_casing(case)[0])
+    assert [sensor["name"] for sensor in made["sensor"]] == ["top", "side"]

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+import xarray as xr
 from casings import RPM, pair_in_a_casing, response
 
 from femgear.trains.gearbox.response import solve_gearbox_response
@@ -12,6 +13,7 @@ from femgear.trains.gearbox.response_results import (
     describe_gearbox_response,
     gearbox_response_warnings,
     line_origin,
+    main_way,
     response_tables,
 )
 
@@ -146,3 +148,32 @@ def test_a_response_of_few_harmonics_tells_what_its_upper_half_does():
     assert few["level_change"].values[0] == pytest.approx(-20.0 * np.log10(first))
     (finding,) = [one for one in gearbox_response_warnings(few) if one.code == "W-EXCITATION"]
     assert finding.key == "dynamics.mesh_harmonics" and "at most 2 mesh harmonics" in finding.text
+
+
+def small_response(**changes):
+    """Two speeds of one stage at one sensor, whose level comes by two ways."""
+    values = {
+        "dynamic_factor": (("speed", "stage", "kind"), [[[1.5, np.nan]], [[1.02, np.nan]]]),
+        "tail": (("speed", "stage"), [[0.8], [0.9]]),
+        "outer": (("speed", "stage"), [[0.0], [0.0]]),
+        "lowest_force": (("speed", "stage", "kind"), [[[10.0, np.nan]], [[10.0, np.nan]]]),
+        "path_share": (("speed", "path", "sensor"), [[[0.7], [0.3]], [[0.7], [0.3]]]),
+    }
+    coordinates = {"speed": [1000.0, 2000.0], "stage": ["first"], "path": ["bearing A", "bearing B"], "sensor": ["top"]}
+    attributes = {"up_to": 2e4, "rigid": "", "missing": ""}
+    return xr.Dataset(values | changes, coordinates, attributes)
+
+
+def test_forces_that_rest_on_the_end_of_the_excitation_are_told():
+    (finding,) = gearbox_response_warnings(small_response())
+    assert (finding.code, finding.key) == ("W-TAIL", "dynamics.up_to")
+    assert "to 20 kHz, makes 80%" in finding.text and "at 1000 rpm: K_v 1.5" in finding.text
+    # 0.8 of a fluctuation of 4 % of the force is within five per cent of it
+    small = (("speed", "stage", "kind"), [[[1.04, np.nan]], [[1.02, np.nan]]])
+    assert not [*gearbox_response_warnings(small_response(dynamic_factor=small))]
+
+
+def test_ways_that_cancel_have_no_share():
+    assert main_way(small_response(), 0) == "bearing A (70% of the power)"
+    cancelling = (("speed", "path", "sensor"), [[[-11.0], [12.0]]] * 2)
+    assert main_way(small_response(path_share=cancelling), 0) == "bearing B, but bearing A takes most of that away"

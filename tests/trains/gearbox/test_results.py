@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from casings import casing_tables
 from gearbox_equivalents import elastic_set_tables
-from small_gearbox import pair_tables
+from small_gearbox import pair_tables, planetary_tables
 
 from femgear.findings import Finding
 from femgear.trains.gearbox.results import (
@@ -176,3 +176,15 @@ def test_planets_that_carry_nothing_are_named():
     assert data["planet_load_factor"].values == pytest.approx(np.array([[3.0]]), rel=1e-9)
     (text,) = (one.text for one in deflection_warnings(data) if one.code == "W-OPEN")
     assert text == "set sun-planet 1, set sun-planet 3 carry nothing in load case nominal"
+
+
+def test_no_damping_is_a_doubt():
+    assert codes(gearbox_warnings(read_case(pair_tables() | {"modes": {"damping_ratio": 0.0}}))) == ["W-DAMPING"]
+
+
+def test_weight_alone_shares_no_load():
+    tables = planetary_tables() | {"gravity": {}}
+    tables["operation"]["load_case"][0]["torque"] = dict.fromkeys(
+        tables["operation"]["load_case"][0]["torque"], "0 N m"
+    )
+    assert np.isnan(solve_deflections(read_case(tables)).dataset()["planet_load_factor"]).all()
