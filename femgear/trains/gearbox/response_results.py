@@ -320,6 +320,9 @@ def _end_of_excitation(data: xr.Dataset) -> tuple[str, str]:
 
 def _short_excitation(data: xr.Dataset, number: int, stage: str) -> Iterator[Finding]:
     """Tell the speed at which K_v of a stage rests most on the upper half of its excitation (W-TAIL)."""
+    # of former runs nothing is known
+    if "tail" not in data:
+        return
     factor = np.nanmax(data["dynamic_factor"].values[:, number], axis=1, initial=1.0)
     share = (factor - 1.0) * data["tail"].values[:, number] / factor
     at = int(np.argmax(share))
