@@ -36,7 +36,7 @@ SPECTRUM_FIGURES = tuple(
 PLANET_BEARING_FIGURE = KeyFigure(
     "planet bearing life", HOURS, "life", Stored("planet_bearing_life", pick="smallest"), ("W-LIFE",), whole=True
 )
-_NO_DAMAGE = "none fails: all stresses lie below those of 1e10 load cycles"
+_NO_DAMAGE = "all stresses lie below those of 1e10 load cycles"
 _MOST = 40  # rows of load cases in a table
 
 
@@ -96,7 +96,7 @@ def life_rows(data: Any, marks: Marks, of: tuple[str, ...] = ("life",)) -> Itera
     lives = data[f"{shortest}_life"].values
     at = first_to_fail(data, shortest)
     if math.isinf(lives[at]):
-        yield "shortest life of the teeth, ISO 6336-6", _NO_DAMAGE
+        yield "shortest life of the teeth, ISO 6336-6", f"{marks('none fails', *OF_ROOTS)}: {_NO_DAMAGE}"
     else:
         hours = f"{hours_text(lives[at])} h"
         if lives[at] == 0.0:

@@ -78,7 +78,8 @@ def _of_shared_gear(
 
 def stages_without_life(states: Sequence[Deflection], spectra: Sequence[RatedSpectrum]) -> Iterator[str]:
     """Name the stages that carry in a load case and have no life, and gears of others whose root or flank has none."""
-    titles = [{rated.name.partition(",")[0] for rated in spectra if rated.kind == kind} for kind in KINDS]
+    # ", sun side" and ", back flank" end the name of a gear, which may have commas of its own
+    titles = [{f"{rated.name}," for rated in spectra if rated.kind == kind} for kind in KINDS]
     shared = {
         (stage, number): gear.name for gear in shared_gears(states[0].model.case) for stage, number in gear.places
     }
@@ -91,7 +92,11 @@ def stages_without_life(states: Sequence[Deflection], spectra: Sequence[RatedSpe
             gear: shared.get((stage.name, number), f"{stage.name} {title}")
             for number, (gear, title) in enumerate(gears.items())
         }
-        lacking = [gear for gear, title in named.items() if not all(title in of_kind for of_kind in titles)]
+        lacking = [
+            gear
+            for gear, title in named.items()
+            if not all(any(name.startswith(f"{title},") for name in of_kind) for of_kind in titles)
+        ]
         if len(lacking) == len(gears):
             yield stage.name
         else:

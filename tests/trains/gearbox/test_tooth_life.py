@@ -1,6 +1,7 @@
 """Lives of the teeth of the stages of a gearbox from its loaded states."""
 
 import copy
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -9,6 +10,7 @@ from small_gearbox import pair_tables
 from femgear.stages.strength import rate_case
 from femgear.trains.gearbox.key_figures import gearbox_key_figures
 from femgear.trains.gearbox.life import bearing_life_findings
+from femgear.trains.gearbox.shared_gears import SharedGear
 from femgear.trains.gearbox.stages import solve_deflections
 from femgear.trains.gearbox.tooth_life import (
     pitting_problems,
@@ -73,6 +75,15 @@ def test_stages_and_gears_that_carry_without_a_life_are_named(result):
     of_gear_1 = [rated for rated in stage_spectra(result.states) if "gear 2" not in rated.name]
     assert [*stages_without_life(result.states, of_gear_1)] == ["stage gear 2"]
     assert [*stages_without_life(result.states, [])] == ["stage"]
+
+
+def test_a_gear_with_several_mates_has_its_life_under_a_name_with_commas(result, monkeypatch):
+    shared = SharedGear("input", 24, (("stage", 0), ("other", 0)))
+    spectra = [
+        replace(rated, name=rated.name.replace("stage gear 1", shared.name)) for rated in stage_spectra(result.states)
+    ]
+    monkeypatch.setattr("femgear.trains.gearbox.tooth_life.shared_gears", lambda case: (shared,))
+    assert "," in shared.name and not [*stages_without_life(result.states, spectra)]
 
 
 def test_lives_are_key_figures_of_the_gearbox(result):
