@@ -82,11 +82,11 @@ def written_treatment(material: Any, tell: Callable[[str], None]) -> dict[str, t
     return {_TREATED[0]: (kind, "none"), _HARDNESS[unit]: (f"{material.hardness:.15g}", "none")}
 
 
-def written_strength(strength: Any) -> tuple[dict[str, tuple[str, str]], dict[str, tuple[str, str]]]:
+def written_strength(strength: Any) -> dict[str, tuple[str, str]]:
     """Write the tolerance class of gears and the application factor of meshes as attributes of REXS."""
-    of_gears = {} if strength.quality is None else {_CLASS: (str(strength.quality), "none")}
+    written = {} if strength.quality is None else {_CLASS: (str(strength.quality), "none")}
     factor = strength.application_factor
-    return of_gears, {} if factor == 1.0 else {_FACTORS[0]: (f"{factor:.15g}", "none")}
+    return written if factor == 1.0 else written | {_FACTORS[0]: (f"{factor:.15g}", "none")}
 
 
 def estimated_treatment(model: Model, gear: str, part: Component, material: Component) -> dict[str, Any]:

@@ -46,7 +46,7 @@ from femgear.gears.iso6336_stiffness import STEEL
 from femgear.gears.kinematics import MEMBERS, torque_ratios
 
 if TYPE_CHECKING:
-    from femgear.case.teeth import GearCase
+    pass
 
 _GEARS = ("sun", "planet", "ring")
 _RACK = {"addendum": 1.0, "dedendum": 1.25, "root_radius": 0.25}
@@ -838,7 +838,7 @@ def stage_model(case: Case, name: str) -> Model:
 
 def add_planets(
     w: ModelWriter,
-    case: GearCase,
+    case: Any,
     model: Model,
     stage: str,
     central: tuple[str, str],
@@ -849,6 +849,7 @@ def add_planets(
 
     ``turned`` are the angles of the planets around the negative u axis [rad], ``bearing`` the attributes of theirs.
     """
+    rated = written_strength(case.strength)
     gears, (sun, ring), a = planetary_set(case), central, rexs_attribute
     for number, angle in enumerate(turned, start=1):
         planet, shaft = add_gear(w, case, f"planet {number}", gears.planet, model)
@@ -862,7 +863,7 @@ def add_planets(
                 "cylindrical_stage",
                 center_distance=a(gears.centre_distance, "mm"),
                 rotating_angle_around_neg_u_axis=a(direction % math.tau, "deg"),
-                **written_strength(case.strength)[1],
+                application_factor_iso_6336_2019=rated.get("application_factor_iso_6336_2019"),
             )
             w.relate("assembly", assembly=stage, part=mesh)
             w.relate("stage", stage=mesh, gear_1=pair[0], gear_2=pair[1])
@@ -892,7 +893,9 @@ def add_gear(
         root_diameter=a(section.root_diameter, "mm"),
         u_coordinate_on_shaft=a(place, "mm"),
         inner_diameter=None if internal else rim,
-        **written_strength(case.strength)[0],
+        global_tolerance_class_iso_1328_2013=written_strength(case.strength).get(
+            "global_tolerance_class_iso_1328_2013"
+        ),
     )
     parts = [id]
     if internal and shaft is None:
@@ -908,6 +911,7 @@ def add_gear(
     shaft = shaft or w.add("shaft", f"{name} shaft")
     for part in parts:
         w.relate("assembly", assembly=shaft, part=part)
+    treated = written_treatment(material, lambda text: model.remark(f"{gear.name}.material.grade", text))
     made = w.add(
         "material",
         elastic_modulus=a(material.youngs_modulus, "N / mm^2"),
@@ -915,7 +919,9 @@ def add_gear(
         poisson_ratio=a(material.poisson_ratio),
         endurance_limit_root=a(material.root_stress_limit, "N / mm^2"),
         endurance_limit_flank=a(material.contact_stress_limit, "N / mm^2"),
-        **written_treatment(material, lambda text: model.remark(f"{gear.name}.material.grade", text)),
+        heat_treated_material_type_iso_6336_2019=treated.get("heat_treated_material_type_iso_6336_2019"),
+        surface_hardness_vickers=treated.get("surface_hardness_vickers"),
+        surface_hardness_brinell=treated.get("surface_hardness_brinell"),
     )
     w.relate("reference", origin=id, referenced=made)
     cutter = getattr(section, "cutter_teeth", None)

@@ -292,7 +292,9 @@ class _UnitWriter:
             stage.name,
             center_distance=rexs_attribute(gears.centre_distance, "mm"),
             rotating_angle_around_neg_u_axis=rexs_attribute(angle % math.tau, "deg"),
-            **written_strength(self.case.strength)[1],
+            application_factor_iso_6336_2019=written_strength(self.case.strength).get(
+                "application_factor_iso_6336_2019"
+            ),
         )
         self.w.relate("assembly", assembly=self.unit, part=id)
         self.w.relate("stage", stage=id, gear_1=ids[0], gear_2=ids[1])

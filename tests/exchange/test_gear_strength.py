@@ -66,14 +66,12 @@ def test_what_is_written_comes_back(treatment):
     else:
         assert read == {} and treatment in told[0]
     assert written_treatment(SimpleNamespace(treatment=None), told.append) == {}
-    of_gears, of_meshes = written_strength(StrengthSection(application_factor=1.25, quality=6))
-    assert strength_table(
-        model(), [part("cylindrical_stage", **of_meshes)], [part("cylindrical_gear", **of_gears)]
-    ) == {
+    written = written_strength(StrengthSection(application_factor=1.25, quality=6))
+    assert strength_table(model(), [part("cylindrical_stage", **written)], [part("cylindrical_gear", **written)]) == {
         "application_factor": 1.25,
         "quality": 6,
     }
-    assert written_strength(StrengthSection()) == ({}, {})
+    assert written_strength(StrengthSection()) == {}
 
 
 def test_factors_are_the_least_favourable_ones_and_what_is_missing_is_told():
