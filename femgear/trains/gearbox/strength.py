@@ -262,10 +262,12 @@ def _computed_factors(data: Any, response: Any) -> np.ndarray:
     """K_v (M,) of the response for every mesh of deflection.nc; NaN of stages that it has not."""
     factor = response["dynamic_factor"].max("speed").values
     rows = {str(name): row for row, name in enumerate(response["stage"].values)}
-    exciting = dict(zip(response["mesh"].values, response["stage_of_mesh"].values, strict=True))
+    # files without it have every stage excite alone
+    alone = "stage_of_mesh" not in response
+    exciting = {} if alone else dict(zip(response["mesh"].values, response["stage_of_mesh"].values, strict=True))
     computed = np.full(data.sizes["mesh"], np.nan)
     for mesh, (stage, kind) in enumerate(data["iso_place"].values.tolist()):
-        name = str(exciting[data["mesh"].values[mesh]])
+        name = str(exciting.get(data["mesh"].values[mesh], data["stage"].values[stage]))
         if stage >= 0 and name in rows:
             computed[mesh] = factor[rows[name], kind]
     return computed
