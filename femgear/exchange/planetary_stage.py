@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from itertools import pairwise
@@ -911,18 +911,7 @@ def add_gear(
     shaft = shaft or w.add("shaft", f"{name} shaft")
     for part in parts:
         w.relate("assembly", assembly=shaft, part=part)
-    treated = written_treatment(material, lambda text: model.remark(f"{gear.name}.material.grade", text))
-    made = w.add(
-        "material",
-        elastic_modulus=a(material.youngs_modulus, "N / mm^2"),
-        density=a(material.density, "kg / dm^3"),
-        poisson_ratio=a(material.poisson_ratio),
-        endurance_limit_root=a(material.root_stress_limit, "N / mm^2"),
-        endurance_limit_flank=a(material.contact_stress_limit, "N / mm^2"),
-        heat_treated_material_type_iso_6336_2019=treated.get("heat_treated_material_type_iso_6336_2019"),
-        surface_hardness_vickers=treated.get("surface_hardness_vickers"),
-        surface_hardness_brinell=treated.get("surface_hardness_brinell"),
-    )
+    made = _add_material(w, material, lambda text: model.remark(f"{gear.name}.material.grade", text))
     w.relate("reference", origin=id, referenced=made)
     cutter = getattr(section, "cutter_teeth", None)
     tool = w.add(
@@ -948,6 +937,22 @@ def add_gear(
         w.relate("manufacturing_step", workpiece=flank, tool=tool, manufacturing_settings=settings)
     _add_modifications(w, case, gear, flanks, model)
     return id, shaft
+
+
+def _add_material(w: ModelWriter, material: Any, tell: Callable[[str], None]) -> str:
+    """Add the material of a gear with its limits and its treatment; its id."""
+    a, treated = rexs_attribute, written_treatment(material, tell)
+    return w.add(
+        "material",
+        elastic_modulus=a(material.youngs_modulus, "N / mm^2"),
+        density=a(material.density, "kg / dm^3"),
+        poisson_ratio=a(material.poisson_ratio),
+        endurance_limit_root=a(material.root_stress_limit, "N / mm^2"),
+        endurance_limit_flank=a(material.contact_stress_limit, "N / mm^2"),
+        heat_treated_material_type_iso_6336_2019=treated.get("heat_treated_material_type_iso_6336_2019"),
+        surface_hardness_vickers=treated.get("surface_hardness_vickers"),
+        surface_hardness_brinell=treated.get("surface_hardness_brinell"),
+    )
 
 
 def _add_modifications(w: ModelWriter, case: Case, gear: Any, flanks: Mapping[str, str], model: Model) -> None:
