@@ -146,6 +146,7 @@ def test_a_missing_tooth_is_gone_from_the_solid(tmp_path, twist):
         assert np.cos(away) == pytest.approx(-1.0, abs=1e-6)
 
 
+@pytest.mark.slow
 def test_a_broken_tip_is_cut_off_the_ring(tmp_path):
     gear = planetary_set(read_case(CASES / "planetary_27_40_108.toml")).ring
     reach = gear.tip_radius + 0.4e-3

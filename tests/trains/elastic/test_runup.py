@@ -249,7 +249,7 @@ def test_safeties_of_static_runs_have_no_dynamic_factors(case, files):
     told, notes = told_of(case, alone)
     safety = 2 * 430e6 / files["stress"]["iso_root_stress"].values[0, 0]
     assert told["safety S_F, ISO 6336-3:2019"].startswith(f"sun {safety:.2f},")
-    assert "Y_M/(sigma_F0):" in notes and "(Z sigma_H0):" in notes
+    assert "Y_M/(sigma_F0 K_gamma):" in notes and "(Z sigma_H0 sqrt(K_gamma)):" in notes
     assert "K_v (a response, or operation.speeds with strength.quality)" in notes
 
 

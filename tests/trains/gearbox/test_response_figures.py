@@ -1,5 +1,7 @@
 """Pictures of the response of a gearbox show its levels, lines and mesh forces."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 import xarray as xr
@@ -162,12 +164,12 @@ def test_lines_are_named_by_stage_harmonic_and_turns_of_the_carrier():
 
 
 def test_the_pictures_of_both_stages_are_among_those_of_a_gearbox():
-    drawn = Drawn(None, {"dynamics": response_data(speeds=1), "runup": response_data()})
+    drawn = Drawn(SimpleNamespace(sensor=()), {"dynamics": response_data(speeds=1), "runup": response_data()})
     for stage in ("dynamics", "runup"):
         assert FIGURES[stage].captions.keys() == FIGURES[stage].draw(drawn).keys()
     silent = {stage: data.drop_vars(["level", "level_of_stage"]) for stage, data in drawn.data.items()}
     assert not FIGURES["dynamics"].draw(Drawn(None, silent))
-    assert [*FIGURES["runup"].draw(Drawn(None, {"runup": silent["runup"]}))] == ["run_up_forces", "stage_forces"]
+    assert [*FIGURES["runup"].draw(Drawn(SimpleNamespace(sensor=()), {"runup": silent["runup"]}))] == ["run_up_forces", "stage_forces"]
 
 
 def test_back_flanks_are_drawn_below_zero_and_every_mesh_of_its_stage():
