@@ -169,7 +169,10 @@ def test_the_pictures_of_both_stages_are_among_those_of_a_gearbox():
         assert FIGURES[stage].captions.keys() == FIGURES[stage].draw(drawn).keys()
     silent = {stage: data.drop_vars(["level", "level_of_stage"]) for stage, data in drawn.data.items()}
     assert not FIGURES["dynamics"].draw(Drawn(None, silent))
-    assert [*FIGURES["runup"].draw(Drawn(SimpleNamespace(sensor=()), {"runup": silent["runup"]}))] == ["run_up_forces", "stage_forces"]
+    assert [*FIGURES["runup"].draw(Drawn(SimpleNamespace(sensor=()), {"runup": silent["runup"]}))] == [
+        "run_up_forces",
+        "stage_forces",
+    ]
 
 
 def test_back_flanks_are_drawn_below_zero_and_every_mesh_of_its_stage():
