@@ -363,6 +363,8 @@ def judge_smoothness(answer: str, results: Any, stages: Sequence[str]) -> Judgem
     if not present:
         return Judgement(SMOOTH, "open", "not known" if answer == "-" else answer, "no motion was computed")
     against = list(dict.fromkeys(_against(results, present)))
+    if not against and any(finding.code == "W-TAIL" and finding.severity == DOUBT for finding in results.findings):
+        return Judgement(SMOOTH, "look", answer, "mesh forces are cut short")
     if not against:
         return Judgement(SMOOTH, "good", answer, "teeth stay in contact, motions are stable")
     return Judgement(SMOOTH, "look", answer, ", ".join(against), f"At some speeds {' and '.join(against)}")
@@ -377,8 +379,6 @@ def _against(results: Any, stages: Sequence[str]) -> Iterator[str]:
         yield "teeth part"
     if any("back_contact" in part and float(part["back_contact"].max()) > 0.0 for part in data):
         yield "teeth press on their back flanks"
-    if any(finding.code == "W-TAIL" and finding.severity == DOUBT for finding in results.findings):
-        yield "dynamic forces need a longer excitation"
     unstable = any("stable" in part and bool((part["stable"].values == 0).any()) for part in data)
     if unstable or codes & {"W-UNSTABLE", "W-GROWTH"}:
         yield "motions are not stable"

@@ -192,6 +192,9 @@ def test_a_run_is_smooth_unless_teeth_part_or_motions_grow():
     pulled = Files(dynamics=xr.Dataset({"level": ("speed", np.ones(2))}))
     pulled.findings = (Finding("W-PULL", "", "it pulls"),)
     assert judge_smoothness("-", pulled, ("dynamics",)).limit == "teeth part"
+    pulled.findings = (Finding("W-TAIL", "", "it ends short", severity=DOUBT),)
+    short = judge_smoothness("-", pulled, ("dynamics",))
+    assert (short.state, short.limit) == ("look", "mesh forces are cut short")
 
 
 def test_a_level_without_a_limit_is_judged_by_resonances_alone():
