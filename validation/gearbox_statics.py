@@ -20,6 +20,7 @@ from gearbox_equivalents import (
     set_tables,
 )
 from published.planetary_sets import kahraman_set, lin_parker_set
+from small_gearbox import split_pair_tables
 
 from femgear.run import solve
 from femgear.stages.lumped_set import Gravity, gear_set_problem
@@ -333,7 +334,8 @@ def stages_side_by_side() -> tuple[Row, ...]:
     modulus, radius, ratio = 206e9 / 2.6, 0.036 * math.cos(math.radians(20.0)), 36.0 / 24.0
     rows = []
     for second, gap in ((1e8, 0.0), (4e8, 0.03), (1e8, 0.03)):
-        found = solve_deflection(read_case(_two_pairs(second, gap)))
+        tables = split_pair_tables(f"{second} N/m", position=f"{0.03 + gap} m") | {"motions": "rotation"}
+        found = solve_deflection(read_case(tables))
         # torque enters before the pairs and leaves behind them: each way has the shaft of the other's gap
         of_input, of_output = (gap * 32.0 / (math.pi * modulus * diameter**4) for diameter in (0.03, 0.04))
         first = 1.0 / (4e8 * radius**2) + ratio**2 * of_output
@@ -344,40 +346,3 @@ def stages_side_by_side() -> tuple[Row, ...]:
         balance = found.mesh_force.sum() * radius / 100.0 - 1.0
         rows.append(at_most(case, "equilibrium", "torques of both less the input, relative", LARGEST, balance))
     return tuple(rows)
-
-
-def _two_pairs(second: float, gap: float) -> dict[str, Any]:
-    """Tables of two pairs 24/36 on two shafts that twist, the second one of its own stiffness [N/m] and place [m]."""
-    gears = {"teeth": [24, 36], "module": "3 mm", "face_width": "20 mm"}
-    pairs = [
-        {
-            "name": name,
-            "shafts": ["input", "output"],
-            "positions": [f"{place} m", f"{place} m"],
-            "gears": gears,
-            "mesh": {"stiffness": f"{stiffness} N/m"},
-        }
-        for name, place, stiffness in (("first", 0.03, 4e8), ("second", 0.03 + gap, second))
-    ]
-    return {
-        "model": "gearbox",
-        "title": "two pairs side by side",
-        "motions": "rotation",
-        "shaft": [
-            {"name": "input", "part": [{"length": "90 mm", "outer_diameter": "30 mm"}]},
-            {"name": "output", "axis": ["90 mm", "0 mm"], "part": [{"length": "90 mm", "outer_diameter": "40 mm"}]},
-        ],
-        "bearing": [
-            {"name": name, "shaft": name, "position": "5 mm", "radial": "2e8 N/m", "axial": "1e8 N/m"}
-            for name in ("input", "output")
-        ],
-        "pair": pairs,
-        "load": [
-            {"name": "motor", "shaft": "input", "position": "0 mm"},
-            {"name": "brake", "shaft": "output", "position": "90 mm"},
-        ],
-        "operation": {
-            "output": ["brake"],
-            "load_case": [{"torque": {"motor": "100 N m"}, "speed": {"input": "1000 rpm"}}],
-        },
-    }

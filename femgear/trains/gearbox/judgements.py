@@ -155,7 +155,8 @@ def _margins(results: Any) -> Iterator[LevelMargin]:
         if stage not in results.stages or "level" not in results[stage]:
             continue
         speed, names = results[stage]["speed"].values, results[stage]["sensor"].values.tolist()
-        for name, points in limits.items():
+        # a sensor of a casing from a file that has no node is not heard
+        for name, points in ((name, limits[name]) for name in names if name in limits):
             level = results[stage]["level"].values[:, names.index(name)]
             over = np.maximum(level, np.finfo(float).tiny) / limit_at(points, speed)
             yield margin_of_levels(speed, 20.0 * np.log10(over), name)
