@@ -227,8 +227,9 @@ def draw_limits(limits: Sequence[FaultLimit]) -> Figure:
         for i, limit in enumerate(limit for limit in limits if limit.kind == kind):
             ax.plot(1e3 * limit.size, limit.excess, marker="o", label=limit.gear, **line_style(i))
         # a fault that never stands out is a line at zero, not an axis of nothing
-        top = max([1.0, *(float(np.max(limit.excess, initial=0.0)) for limit in limits if limit.kind == kind)])
-        ax.set_ylim(-0.05 * top, 1.1 * top)
+        levels = np.concatenate([[0.0, 1.0], *(limit.excess for limit in limits if limit.kind == kind)])
+        low, high = float(np.nanmin(levels)), float(np.nanmax(levels))
+        ax.set_ylim(low - 0.05 * (high - low), high + 0.1 * (high - low))
         ax.set_xscale("log")
         sizes = sorted({1e3 * float(size) for limit in limits if limit.kind == kind for size in limit.size})
         ax.set_xticks(sizes, [f"{size:.2g}" for size in sizes])
