@@ -30,10 +30,12 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 from scipy.sparse import coo_array, csc_array
 
+from femgear import second_process
 from femgear.contact.bodies import (
     ObservedRoot,
     flank_load_columns,
@@ -334,14 +336,15 @@ def root_waves(grid: Grid, gear: Gear, material: Material, wave_number: np.ndarr
         foundation = csc_array((rests.data, place), shape=(3 * grid.n_nodes,) * 2)
     parts = [gear.face_width * width_matrix for width_matrix in wave_stiffness(grid, material)]
     axial = plane_modulus(material, "plane strain") * material.poisson_ratio
-    options, influences = {"count": gear.teeth, "rim": "rim", "loads": loads}, []
-    for k in wave_number:
+
+    def influence(k: float) -> np.ndarray:
         observed = columns.copy()
         observed[3 * along.nodes + 2, np.arange(len(along.nodes))] += axial * k
         matrix = (parts[0] + k * parts[1] + k**2 * parts[2]).tocsc()
-        sector = condense_sector(grid, matrix, observations=observed, **options).supported(foundation)
-        influences.append(observed_root_stress(gear, ObservedRoot(along, stations, sector)).influence)
-    return np.array(influences)
+        sector = condense_sector(grid, matrix, count=gear.teeth, rim="rim", loads=loads, observations=observed)
+        return observed_root_stress(gear, ObservedRoot(along, stations, sector.supported(foundation))).influence
+
+    return np.array(second_process.shared([partial(influence, k) for k in wave_number]))
 
 
 def computed_waves(slices: int) -> np.ndarray:
