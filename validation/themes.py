@@ -9,6 +9,7 @@ from __future__ import annotations
 from validation import (
     axle_casing,
     bearings,
+    bending_planets,
     calculix_carrier,
     calculix_casing,
     calculix_cracks,
@@ -134,8 +135,8 @@ THEMES = (
         "gearbox_planets",
         "Planets of any kind",
         "Planets that are shafts of their own. Compared with: places by trial of all teeth in random sets, speeds by "
-        "the teeth that pass, planetary stages, springs set up by hand, symmetry of lines; gates: exact; 1e-12 of "
-        "linear statics, 1e-10, 1e-9; 1e-6 of a sun that all but floats.",
+        "the teeth that pass, planetary stages, springs set up by hand, symmetry of lines, time integration in axes at "
+        "rest; gates: exact; 1e-12 of linear statics, 1e-10, 1e-9; 1e-6 of a sun that all but floats and in time.",
         (
             gearbox_planets.places,
             gearbox_planets.kinematics,
@@ -144,6 +145,7 @@ THEMES = (
             gearbox_planets.planet_errors,
             gearbox_planets.symmetric_lines,
         ),
+        (bending_planets.bending_planets,),
     ),
     Theme(
         "losses",
