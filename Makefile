@@ -38,8 +38,11 @@ demo: environment
 	$(FEMGEAR) run $(CASE) -o $(OUT) --force
 	@echo "Report: $(OUT)/report.html"
 
+# To rewrite every assert, so that it tells its values, takes as long as a tenth of the tests: those that fail have it.
 test: environment
-	$(PY) -m pytest -n 2 --dist loadfile --benchmark-disable $(ARGS)
+	@$(PY) -m pytest -n 2 --dist loadfile --benchmark-disable --assert=plain $(ARGS) \
+	|| { echo "Those that failed once more, with the values that they compare:"; \
+	$(PY) -m pytest --last-failed --last-failed-no-failures none --benchmark-disable $(ARGS); exit 1; }
 
 test-browser: environment
 	$(PY) -m pip install --quiet --disable-pip-version-check -e ".[browser]"
