@@ -26,10 +26,12 @@ _ROOM = 0.34  # share of the height of a spectrum for the names
 _STAGE_COLOURS = tuple(colour for colour in COLOURS if colour != BLACK)
 
 
-def _loudest(data: xr.Dataset) -> tuple[list[int], str]:
-    """Numbers of the sensors that are drawn, in their order, and words where some are left out."""
-    level = data["level"].values.max(axis=0)
-    chosen = sorted(np.argsort(-level, kind="stable")[:SENSORS_DRAWN].tolist())
+def _loudest(data: xr.Dataset, speed: float | None = None) -> tuple[list[int], str]:
+    """Numbers of the sensors that are drawn, the loudest at a speed [rpm] first, and words where some are left out."""
+    levels = data["level"].values
+    near = speed is not None and np.ptp(data["speed"].values) > 0.0
+    level = levels[np.abs(data["speed"].values - speed).argmin()] if near else levels.max(axis=0)
+    chosen = np.argsort(-level, kind="stable")[:SENSORS_DRAWN].tolist()
     return chosen, "" if len(chosen) == len(level) else f"the loudest {len(chosen)} of {len(level)} sensors"
 
 
@@ -70,7 +72,7 @@ def draw_run_up_levels(
     limits : mapping of str to (speeds,) array, optional
         Largest levels allowed at sensors [m/s^2].
     """
-    chosen, words = _loudest(runup)
+    chosen, words = _loudest(runup, operation)
     speed, level, parts = (runup[name].values for name in ("speed", "level", "level_of_stage"))
     figure, axes = new_figure(rows=len(chosen), height=0.9 + 2.7 * len(chosen), sharex=True)
     several = runup.sizes["stage"] > 1
