@@ -366,7 +366,9 @@ def judge_smoothness(answer: str, results: Any, stages: Sequence[str]) -> Judgem
     if not against and any(finding.code == "W-TAIL" and finding.severity == DOUBT for finding in results.findings):
         return Judgement(SMOOTH, "look", answer, "mesh forces are cut short")
     if not against:
-        return Judgement(SMOOTH, "good", answer, "teeth stay in contact, motions are stable")
+        judged = any("stable" in results[stage] for stage in present)
+        words = "teeth stay in contact, motions are stable" if judged else "teeth stay in contact"
+        return Judgement(SMOOTH, "good", answer, words)
     return Judgement(SMOOTH, "look", answer, ", ".join(against), f"At some speeds {' and '.join(against)}")
 
 

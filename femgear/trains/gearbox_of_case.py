@@ -30,6 +30,10 @@ _TEETH = (*_STAYS, "strength", "helical", "planar", "model", "format")
 """Sections of a case that the teeth of a stage have."""
 _OF_GEARBOX = "runup", "lubricant", "losses"
 """Sections that the gearbox has as the case does."""
+_OF_PLANAR = (
+    *("branch", "response", "published", "back_flanks", "damping_ratios", "smoothing", "gyroscopic", "reaction"),
+)
+"""Entries of planar sets that a gearbox has not."""
 _NO_NAME = re.compile(r"[^A-Za-z0-9_.-]+")
 """What names of parts do not have."""
 _MACHINE_MASS = "1 kg"
@@ -245,11 +249,17 @@ def _gears(case: Any, given: Mapping[str, Any], tables: dict[str, Any]) -> dict[
         if case.train == "helical":
             entries["transverse_inertia"] = quantity(getattr(section, member).diametral_inertia, "kg m^2")
         tables["mass"].append({"shaft": member} | entries)
-    return {
-        "gears": sizes,
-        "sun_mesh": {"stiffness": quantity(stiffness.sun_planet, "N/m")},
-        "ring_mesh": {"stiffness": quantity(stiffness.planet_ring, "N/m")},
+    meshes = {
+        "sun_mesh": (stiffness.sun_planet, gears.backlash_sun_planet),
+        "ring_mesh": (stiffness.planet_ring, gears.backlash_planet_ring),
     }
+    given_play = getattr(section, "line_backlash", None)
+    plays = {name: max(play, 0.0) if given_play is None else given_play for name, (_, play) in meshes.items()}
+    entries = {
+        name: {"stiffness": quantity(spring, "N/m")} | ({"backlash": quantity(plays[name], "m")} if plays[name] else {})
+        for name, (spring, _) in meshes.items()
+    }
+    return {"gears": sizes, **entries}
 
 
 def _support(case: Any, member: str) -> dict[str, float | None]:
@@ -320,7 +330,9 @@ def _left_out(case: Any, given: Mapping[str, Any]) -> Iterator[Finding]:
             f"housing.{key}": key in housing
             for key in ("form", "points", "microphone", "published", "measured", "support", "structure")
         },
-        **{f"planar.{key}": key in planar for key in ("branch", "response", "published")},
+        **{f"planar.{key}": key in planar for key in _OF_PLANAR},
+        # meshes of a given stiffness take the play along, teeth have their own
+        "planar.line_backlash": "line_backlash" in planar and "mesh_stiffness" not in planar,
         "planet.bearing_clearance": bool(given.get("planet", {}).get("bearing_clearance")),
     }
     if case.operation.load_case:

@@ -195,6 +195,9 @@ def test_a_run_is_smooth_unless_teeth_part_or_motions_grow():
     pulled.findings = (Finding("W-TAIL", "", "it ends short", severity=DOUBT),)
     short = judge_smoothness("-", pulled, ("dynamics",))
     assert (short.state, short.limit) == ("look", "mesh forces are cut short")
+    # of motions whose stability nothing tells nothing is said
+    pulled.findings = ()
+    assert judge_smoothness("-", pulled, ("dynamics",)).limit == "teeth stay in contact"
 
 
 def test_a_level_without_a_limit_is_judged_by_resonances_alone():

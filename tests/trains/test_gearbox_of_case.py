@@ -60,6 +60,20 @@ def test_entries_without_a_place_are_told():
     assert written.tables["gravity"]["direction"][2] == 0.0
 
 
+def test_meshes_of_a_given_stiffness_keep_their_play_and_what_has_no_place_is_told():
+    case = read_case("cases/nrel_pgb.toml")
+    written = gearbox_of_case(case)
+    (stage,) = read_case(written.tables).planetary
+    assert stage.sun_mesh.backlash == pytest.approx(482e-6, rel=1e-3) == stage.ring_mesh.backlash
+    changed = with_values(
+        case, {"planar.line_backlash": "0.1 mm", "planar.damping_ratios": [0.03], "planar.back_flanks": True}
+    )
+    written = gearbox_of_case(changed)
+    assert read_case(written.tables).planetary[0].sun_mesh.backlash == pytest.approx(1e-4)
+    keys = {finding.key for finding in written.findings}
+    assert {"planar.damping_ratios", "planar.back_flanks"} <= keys and "planar.line_backlash" not in keys
+
+
 def test_what_is_no_set_is_refused():
     with pytest.raises(CaseError) as refused:
         gearbox_of_case(read_case("cases/gear_pair.toml"))

@@ -463,7 +463,9 @@ def balance_warnings(data: xr.Dataset) -> Iterator[Finding]:
             text = f"{tail:.2g} of the amplitude of {name} is in the upper half of the lines"
             yield Finding("W-TAIL", "balance.harmonics", text, remedy="more harmonics")
     if data.attrs["rigid"]:
-        text = f"{data.attrs['rigid']}: elastic in modes and response, rigid where teeth part"
+        text = (
+            f"{data.attrs['rigid']}: elastic in modes and response, rigid where teeth part: sensors on it are left out"
+        )
         yield Finding("W-RIGID", "balance.harmonics", text, remedy="compare forces of the response before teeth part")
     for name, code, words in (
         ("parted_share", "W-SEPARATION", "part for"),

@@ -85,7 +85,7 @@ def _name(value: object) -> str:
         message = f"a name is needed, not {described(value)}"
         raise CaseError(message, code="E-TYPE", value=value, remedy="write it in quotation marks")
     if not _NAME.fullmatch(value) or value != value.strip():
-        limit = "40 letters, digits, blanks, dots, - or _"
+        limit = "40 letters a to z or A to Z, digits, blanks, dots, - or _"
         raise CaseError("not a name for a part", code="E-CHOICE", value=value, limit=limit)
     return value
 

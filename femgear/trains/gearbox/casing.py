@@ -77,6 +77,11 @@ def bearing_name(bearing: BoxBearingSection, number: int) -> str:
     return bearing.name or f"bearing {number + 1} of {bearing.shaft}"
 
 
+def called(kind: str, name: str) -> str:
+    """Name of a part with its kind, once."""
+    return name if kind in name.split() else f"{kind} {name}"
+
+
 def casing_seats(case: GearboxCase) -> dict[str, np.ndarray]:
     """Find the places (3,) of all that sits in the casing [m], by name, whether or not the casing moves.
 

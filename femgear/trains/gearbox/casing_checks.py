@@ -7,13 +7,15 @@ from collections.abc import Iterator
 import numpy as np
 
 from femgear.case.messages import no_such
-from femgear.case.quantities import INERTIA
+from femgear.case.quantities import INERTIA, LENGTH
 from femgear.errors import CaseError
 from femgear.trains.gearbox.case_file import CASING, BoxCasingSection, BoxSensorSection, GearboxCase
 from femgear.trains.gearbox.casing import inertia_tensor, named_seats
 
 # By which the largest principal inertia may exceed the sum of both others, relative: rounding of a drawing.
 _FLAT = 1e-3
+_FAR = 3.0
+"""Distance of a sensor from the nearest foot or seat, at most, over that of those farthest from one another."""
 _DIRECTIONS = '"x", "y", "z", one of these after a minus sign, or three numbers'
 
 
@@ -193,6 +195,27 @@ def _sensors(case: GearboxCase) -> Iterator[CaseError]:
             yield CaseError("an angle without a ring", code="E-CHOICE", key=f"{key}.angle", limit=limit, remedy=remedy)
         elif case.casing is not None:
             yield from _place_of_sensor(key, sensor, case.casing)
+            yield from _reach_of_sensor(case, key, sensor)
+
+
+def _reach_of_sensor(case: GearboxCase, key: str, sensor: BoxSensorSection) -> Iterator[CaseError]:
+    """A sensor on a rigid casing, near what sits in it: anywhere else its level is that of a lever."""
+    section = case.casing
+    if sensor.position is None or section is None or section.centre is None:
+        return
+    feet = [foot.position for foot in section.foot if foot.position is not None]
+    places = np.array([section.centre, *feet, *(place for _, _, place in named_seats(case))])
+    size = float(np.linalg.norm(np.ptp(places, axis=0)))
+    away = float(np.linalg.norm(np.asarray(sensor.position) - places, axis=1).min())
+    if away > _FAR * size > 0.0:
+        yield CaseError(
+            "the sensor is not on the casing",
+            code="E-RANGE",
+            key=f"{key}.position",
+            value=f"{LENGTH.show(away)} from the nearest foot or seat",
+            limit=f"at most {LENGTH.show(_FAR * size)}, {_FAR:g} times the size of the casing",
+            remedy="give x, y and z of a place on it",
+        )
 
 
 def _ring_of_sensor(case: GearboxCase, key: str, sensor: BoxSensorSection) -> Iterator[CaseError]:

@@ -16,6 +16,7 @@ from femgear.trains.gearbox.case_file import (
     CASING,
     BoxBearingSection,
     BoxPlanetarySection,
+    BoxShaftSection,
     GearboxCase,
     PairSection,
     embed_stages,
@@ -370,8 +371,24 @@ def _ring_places(case: GearboxCase, bearing: BoxBearingSection, key: str) -> Ite
             value=f"z = {LENGTH.show(places[0])} and {LENGTH.show(places[1])}, axes "
             f"{LENGTH.show(math.dist(first.axis, second.axis))} apart",
             limit="one place on one axis",
-            remedy=f'give outer_position = "{LENGTH.show(places[0] - second.start)}"',
+            remedy=_one_place(bearing, first, second, places[0], apart),
         )
+
+
+def _one_place(
+    bearing: BoxBearingSection, inner: BoxShaftSection, outer: BoxShaftSection, z: float, apart: float
+) -> str:
+    """What puts both rings of a bearing at one place: z [m] of its inner ring, where the outer shaft reaches it."""
+    if apart > DISTANCE_TOLERANCE:
+        return f"bearings join shafts on one axis: give {bearing.outer_shaft} the axis of {bearing.shaft}"
+    end = outer.start + outer.length
+    if outer.part and not outer.start <= z <= end:
+        both = max(inner.start, outer.start), min(inner.start + inner.length, end)
+        if both[0] > both[1]:
+            return f"{bearing.shaft} and {bearing.outer_shaft} are nowhere beside one another: change their start"
+        inside, around = (LENGTH.show(both[0] - shaft.start) for shaft in (inner, outer))
+        return f'at z = {LENGTH.show(both[0])} both are: position = "{inside}", outer_position = "{around}"'
+    return f'give outer_position = "{LENGTH.show(z - outer.start)}"'
 
 
 def _shaft_parts(case: GearboxCase) -> Iterator[CaseError]:

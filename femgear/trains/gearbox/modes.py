@@ -10,6 +10,7 @@ from itertools import pairwise
 import numpy as np
 
 from femgear.case.dependencies import Steps
+from femgear.errors import CaseError
 from femgear.solvers.linear.modal import undamped_modes
 from femgear.solvers.linear.tracking import CampbellData, campbell_data
 from femgear.system.assembly import Assembly, Beam
@@ -17,6 +18,7 @@ from femgear.system.mode_kinds import SetMotions, class_energies, named_kinds
 from femgear.system.system import MechanicalSystem, Modes
 from femgear.trains.gearbox.carrier import pin_axes
 from femgear.trains.gearbox.case_file import CASING, BoxPlanetarySection
+from femgear.trains.gearbox.casing import called
 from femgear.trains.gearbox.deflection import Deflection, laws_of
 from femgear.trains.gearbox.elastic_carrier import with_carriers
 from femgear.trains.gearbox.elastic_ring import elastic_rings, with_rings
@@ -118,9 +120,19 @@ class GearboxModes:
 def linear_system(found: Deflection) -> tuple[Assembly, MechanicalSystem, np.ndarray]:
     """Linearise a gearbox about its loaded state: assembly with bearings, system, stiffness (s,) of slices [N/m].
 
-    Slices that carry nothing have no stiffness.
+    Slices that carry nothing have no stiffness. CaseError: a shaft without mass (E-MASS).
     """
     model = found.model
+    for number, shaft in enumerate(model.case.shaft):
+        if shaft.part and shaft.material is not None and shaft.material.density == 0.0:
+            raise CaseError(
+                f"shaft {shaft.name} has no mass, and so no motion",
+                code="E-MASS",
+                key=f"shaft[{number}].material.density",
+                value="0 kg/m^3",
+                limit="above 0; deflection alone needs none (--only deflection)",
+                remedy="give the density, steel has 7850 kg/m^3",
+            )
     bearings = []
     for number, law, springs in laws_of(model, model.estimate):
         tangent = law.share(found.bearing_stiffness[number])
@@ -284,11 +296,6 @@ def _kinetic(
     return members, kinetic / total, tuple(kinds)
 
 
-def _called(kind: str, name: str) -> str:
-    """Name of a part with its kind, once."""
-    return name if kind in name.split() else f"{kind} {name}"
-
-
 def _strain(
     found: Deflection, assembly: Assembly, motion, of_meshes, modes: Modes, inner: dict[str, np.ndarray]
 ) -> tuple[tuple[str, ...], np.ndarray]:
@@ -305,20 +312,20 @@ def _strain(
 
     beams = model.assembly.beams
     for shaft, beam in zip(model.beams, beams, strict=False):
-        add(_called("shaft", shaft), beam.stations, beam.stiffness)
+        add(called("shaft", shaft), beam.stations, beam.stiffness)
     for beam in beams[len(model.beams) :]:
         add(CASING, beam.stations, beam.stiffness)
     for number, springs in enumerate(model.bearings):
         finite = np.where(np.isfinite(found.bearing_stiffness[number]), found.bearing_stiffness[number], 0.0)
-        add(_called("bearing", springs.name), springs.stations, springs.rows.T @ finite @ springs.rows)
+        add(called("bearing", springs.name), springs.stations, springs.rows.T @ finite @ springs.rows)
     for number, springs in enumerate(model.joints):
         finite = np.where(np.isfinite(springs.stiffness), springs.stiffness, 0.0)
-        label = _called("coupling", springs.name) if number < len(model.case.coupling) else springs.name
+        label = called("coupling", springs.name) if number < len(model.case.coupling) else springs.name
         add(label, springs.stations, (springs.rows.T * finite) @ springs.rows)
     if model.casing is not None:
         for springs, values in zip(model.casing.feet, model.casing.foot_stiffness, strict=True):
             finite = np.where(np.isfinite(values), values, 0.0)
-            add(_called("foot", springs.name), springs.stations, (springs.rows.T * finite) @ springs.rows)
+            add(called("foot", springs.name), springs.stations, (springs.rows.T * finite) @ springs.rows)
     for stage in model.stages:
         name = f"meshes of {stage.name}"
         energies[name] = np.sum([of_meshes[assembly.slices[mesh]].sum(axis=0) for mesh in stage.meshes], axis=0)

@@ -15,7 +15,7 @@ import numpy as np
 
 from femgear.housing.two_way.running_planets import RunningResponse, forces_on_structure
 from femgear.system.assembly import Assembly, solved_conditions
-from femgear.trains.gearbox.casing import CasingModel, rigid_foot_rows
+from femgear.trains.gearbox.casing import CasingModel, called, rigid_foot_rows
 from femgear.trains.gearbox.deflection import Deflection, spread_rows
 from femgear.trains.gearbox.model import GearboxModel
 from femgear.trains.gearbox.modes import linear_system
@@ -124,7 +124,7 @@ def _parts(
         rows = spread_rows(springs, assembly)
         finite = np.where(np.isfinite(tangent), tangent, 0.0)
         parts.append(
-            (f"bearing {springs.name}", springs.stations, rows.T @ finite @ rows, bool(np.isinf(tangent).any()))
+            (called("bearing", springs.name), springs.stations, rows.T @ finite @ rows, bool(np.isinf(tangent).any()))
         )
     for springs in model.joints:
         rows, holds = spread_rows(springs, assembly), np.isinf(springs.stiffness)

@@ -15,6 +15,7 @@ import numpy as np
 
 from femgear.findings import Finding
 from femgear.trains.gearbox.case_file import named_load_case
+from femgear.trains.gearbox.casing import called
 from femgear.trains.gearbox.deflection import LEVERS, Deflection, laws_of, spread_rows
 
 if TYPE_CHECKING:
@@ -106,4 +107,6 @@ def loose_notes(data: xr.Dataset) -> Iterator[str]:
         data["bearing"].values, largest, lowest, data["bearing_loose"].values.max(axis=0), strict=True
     ):
         force = f"{low:.5g} N to {high:.5g} N" if high else "nothing"
-        yield f"bearing {name} carries {force}" + (f", {loose:.1%} of the time nothing" if 0.0 < loose < 1.0 else "")
+        yield f"{called('bearing', name)} carries {force}" + (
+            f", {loose:.1%} of the time nothing" if 0.0 < loose < 1.0 else ""
+        )

@@ -231,7 +231,8 @@ def turns_in_words(frequencies: StageFrequencies) -> str:
     if mesh is None:
         return "-"
     first, second = frequencies.hunting_turns[mesh]
-    return f"{first} and {second} turns, {frequencies.hunting_time[mesh]:.4g} s"
+    turns, time = f"{first} and {second} turns", frequencies.hunting_time[mesh]
+    return f"{turns}, {time:.4g} s" if math.isfinite(time) else turns
 
 
 def heard_stages(case: GearboxCase) -> dict[str, HeardSet]:

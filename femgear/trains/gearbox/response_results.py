@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -11,7 +11,7 @@ import numpy as np
 
 from femgear.case.quantities import RPM
 from femgear.findings import Finding
-from femgear.report.tables import Block, tabulate
+from femgear.report.tables import Block, in_decibels, tabulate
 from femgear.stages.protocol import StageResult
 from femgear.storage.contents import Contents
 from femgear.trains.gearbox.resonance_table import resonance_variables
@@ -24,12 +24,16 @@ if TYPE_CHECKING:
 
 LINES_SHOWN = 12
 """Lines of a sensor in the table."""
+SENSORS_JUDGED = 3
+"""Sensors that page one judges, at most: the loudest ones."""
 _CHANGE = 0.5
-"""Change of a level by the upper half of the excitation that is told [dB]."""
+"""Change of a level by a longer excitation that is told [dB]."""
+_FORCE_CHANGE = 0.05
+"""Relative change of the largest mesh force by a longer excitation that is told."""
 _CROSS = 0.05
 """Force by the stiffness of a stage on the motion of another one, over its dynamic force, that is told."""
 _TAIL = 0.05
-"""Share of mesh forces at the outer side bands, and of K_v in the upper half of the excitation, that is told."""
+"""Share of mesh forces at the outer side bands that is told."""
 _CANCELS = 1.5
 """Share of one way in the power of a level beyond which others cancel it."""
 _KINDS = ("sun", "ring")
@@ -41,7 +45,7 @@ class GearboxResponseResult(StageResult):
 
     ``found`` is the response; ``whole`` keeps the lines of bearings too; ``unresolved`` counts the resonances of a
     run-up whose peaks its speeds miss, ``resonances`` are all of them. ``frictionless`` is the response without the
-    friction of the teeth, where that acts.
+    friction of the teeth, where that acts. ``longer`` is the response with a longer excitation at some of the speeds.
     """
 
     found: GearboxResponse
@@ -49,6 +53,7 @@ class GearboxResponseResult(StageResult):
     unresolved: int = 0
     resonances: GearboxResonances | None = None
     frictionless: GearboxResponse | None = None
+    longer: GearboxResponse | None = None
 
     @property
     def residual(self) -> float:
@@ -75,6 +80,7 @@ class GearboxResponseResult(StageResult):
         variables = _of_stages(found) | _of_lines(found)
         moved = accelerations(found, sensors)
         variables |= _at_sensors(found, moved) if sensors else {}
+        variables |= {} if self.longer is None else _by_longer(found, self.longer, moved)
         variables |= {} if self.resonances is None else resonance_variables(found, self.resonances, moved)
         of_bearings = {stage.name: stage.motion[:, forces] for stage in found.stages}
         size = (len(found.speed), bearings, 3)
@@ -115,6 +121,7 @@ class GearboxResponseResult(StageResult):
         attrs = {
             "title": "response of the gearbox to its stages",
             "up_to": found.up_to,
+            "compared_to": math.nan if self.longer is None else self.longer.up_to,
             "most_harmonics": model.case.dynamics.mesh_harmonics or 0,
             "reference": found.reference,
             "missing": ", ".join(found.missing),
@@ -129,11 +136,9 @@ def _at_sensors(found: GearboxResponse, moved: dict[str, np.ndarray]) -> dict[st
     """Levels, shares of stages and ways, and lines at the sensors, of accelerations by stage."""
     lines = np.concatenate([moved[stage.name] for stage in found.stages], axis=2)
     by_stage = np.stack([_rms(moved[stage.name]) for stage in found.stages], axis=2)
-    change = "change of the level by lines beyond half the frequency of the excitation"
     return {
         "level": ("speed sensor", level(found, moved), "m/s^2", "root mean square of the acceleration"),
         "level_of_stage": ("speed sensor stage", by_stage, "m/s^2", "the same by the lines of one stage"),
-        "level_change": ("speed sensor", _change(found, moved), "dB", change),
         **_of_paths(found, moved),
         **_complex("lines", "speed sensor line", lines, "m/s^2", "acceleration, amplitude of the line"),
     }
@@ -232,15 +237,22 @@ def _rms(lines: np.ndarray) -> np.ndarray:
     return np.sqrt(0.5 * (np.abs(lines) ** 2).sum(axis=-1))
 
 
+def _by_kind(found: GearboxResponse, values: Callable[[StageLines], np.ndarray]) -> np.ndarray:
+    """Values (v, stages, 2) of the kinds of meshes of all stages; NaN where a pair has no second mesh."""
+    whole = np.full((len(found.speed), len(found.stages), 2), np.nan)
+    for number, stage in enumerate(found.stages):
+        own = values(stage)
+        whole[:, number, : own.shape[1]] = own
+    return whole
+
+
+def _factors(found: GearboxResponse) -> np.ndarray:
+    """Largest mesh forces over their means (v, stages, 2)."""
+    return _by_kind(found, lambda stage: stage.force[..., 1] / stage.force[..., 0])
+
+
 def _of_stages(found: GearboxResponse) -> dict[str, tuple]:
     """Mesh forces and figures of the solutions, stage by stage."""
-
-    def kinds(values) -> np.ndarray:
-        whole = np.full((len(found.speed), len(found.stages), 2), np.nan)
-        for number, stage in enumerate(found.stages):
-            own = values(stage)
-            whole[:, number, : own.shape[1]] = own
-        return whole
 
     def figures(name: str) -> np.ndarray:
         return np.stack([getattr(stage, name) for stage in found.stages], axis=1)
@@ -248,25 +260,25 @@ def _of_stages(found: GearboxResponse) -> dict[str, tuple]:
     return {
         "dynamic_factor": (
             "speed stage kind",
-            kinds(lambda stage: stage.force[..., 1] / stage.force[..., 0]),
+            _factors(found),
             "1",
             "largest mesh force over its mean; NaN where a pair has no second mesh",
         ),
         "lowest_force": (
             "speed stage kind",
-            kinds(lambda stage: stage.force[..., 2]),
+            _by_kind(found, lambda stage: stage.force[..., 2]),
             "N",
             "smallest mesh force along the normal; below zero real flanks part",
         ),
         "mean_force": (
             "speed stage kind",
-            kinds(lambda stage: stage.force[..., 0]),
+            _by_kind(found, lambda stage: stage.force[..., 0]),
             "N",
             "mean mesh force along the normal",
         ),
         "mesh_force_rms": (
             "speed stage kind",
-            kinds(lambda stage: stage.dynamic_force),
+            _by_kind(found, lambda stage: stage.dynamic_force),
             "N",
             "root mean square of the mesh force about its mean",
         ),
@@ -298,18 +310,19 @@ def _of_lines(found: GearboxResponse) -> dict[str, tuple]:
     }
 
 
-def _change(found: GearboxResponse, moved: dict[str, np.ndarray]) -> np.ndarray:
-    """Change of the levels (v, s) by lines beyond half the frequency, or half the harmonics, of the excitation [dB]."""
-    half, most = math.pi * found.up_to, found.deflection.model.case.dynamics.mesh_harmonics or math.inf
-
-    def low(stage: StageLines) -> np.ndarray:
-        kept = (stage.order * found.speed[:, None] <= half) & (2 * stage.harmonic <= most)
-        return moved[stage.name] * kept[:, None]
-
-    less = level(found, {stage.name: low(stage) for stage in found.stages})
-    whole = level(found, moved)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        return np.where(whole > 0.0, 20.0 * np.log10(whole / less), 0.0)
+def _by_longer(found: GearboxResponse, longer: GearboxResponse, moved: dict[str, np.ndarray]) -> dict[str, tuple]:
+    """Largest mesh forces with a longer excitation, and the change of levels by it; NaN where it was not solved."""
+    places = np.searchsorted(found.speed, longer.speed)
+    factor = np.full((len(found.speed), len(found.stages), 2), np.nan)
+    factor[places] = _factors(longer)
+    text = "dynamic_factor with excitation up to the frequency compared_to; NaN at speeds that were not looked at"
+    variables: dict[str, tuple] = {"longer_dynamic_factor": ("speed stage kind", factor, "1", text)}
+    if not (sensors := len(gearbox_sensors(found.deflection.model.case))):
+        return variables
+    change = np.full((len(found.speed), sensors), np.nan)
+    change[places] = _decibels(level(longer, accelerations(longer, sensors)), level(found, moved)[places])
+    text = "change of the level with excitation up to the frequency compared_to; NaN at speeds that were not looked at"
+    return variables | {"level_change": ("speed sensor", change, "dB", text)}
 
 
 def _end_of_excitation(data: xr.Dataset) -> tuple[str, str]:
@@ -319,21 +332,41 @@ def _end_of_excitation(data: xr.Dataset) -> tuple[str, str]:
 
 
 def _short_excitation(data: xr.Dataset, number: int, stage: str) -> Iterator[Finding]:
-    """Tell the speed at which K_v of a stage rests most on the upper half of its excitation (W-TAIL)."""
-    # of former runs nothing is known
-    if "tail" not in data:
+    """Tell the speed at which a longer excitation changes K_v of a stage most (W-TAIL).
+
+    Files of former versions are compared to nothing.
+    """
+    if "longer_dynamic_factor" not in data:
+        if math.isnan(data.attrs.get("compared_to", 0.0)):
+            text = f"a longer excitation than to {_reach(data)} has no solution: what it changes is not known"
+            yield Finding("W-TAIL", "modes.damping_ratio", text, remedy="give the modes some damping")
         return
-    factor = np.nanmax(data["dynamic_factor"].values[:, number], axis=1, initial=1.0)
-    share = (factor - 1.0) * data["tail"].values[:, number] / factor
-    at = int(np.argmax(share))
-    if share[at] > _TAIL:
+    factor, longer = (data[name].values[:, number] for name in ("dynamic_factor", "longer_dynamic_factor"))
+    change = np.nan_to_num(np.abs(longer / factor - 1.0))
+    at, kind = np.unravel_index(int(change.argmax()), change.shape)
+    if change[at, kind] > _FORCE_CHANGE:
         key, remedy = _end_of_excitation(data)
         text = (
-            f"the upper half of the excitation, to {_reach(data)}, makes {data['tail'].values[at, number]:.0%} of the "
-            f"fluctuation of the mesh forces of {stage} at {data['speed'].values[at]:.5g} rpm: K_v {factor[at]:.3g} "
-            "changes with what lies beyond"
+            f"excitation to {_compared_to(data)} in place of {_reach(data)} changes K_v of {stage} at "
+            f"{data['speed'].values[at]:.5g} rpm from {factor[at, kind]:.3g} to {longer[at, kind]:.3g}"
         )
         yield Finding("W-TAIL", key, text, remedy=remedy)
+
+
+def _level_excitation(data: xr.Dataset) -> Iterator[Finding]:
+    """Tell the sensor and speed at which a longer excitation changes the level most (W-EXCITATION)."""
+    if "level_change" not in data or "compared_to" not in data.attrs:
+        return
+    change = np.nan_to_num(data["level_change"].values, posinf=0.0, neginf=0.0)
+    at, sensor = np.unravel_index(int(np.abs(change).argmax()), change.shape)
+    if abs(change[at, sensor]) > _CHANGE:
+        key, remedy = _end_of_excitation(data)
+        text = (
+            f"excitation to {_compared_to(data)} in place of {_reach(data)} changes the level of "
+            f"{data['sensor'].values[sensor]} at {data['speed'].values[at]:.5g} rpm "
+            f"by {in_decibels(change[at, sensor])}"
+        )
+        yield Finding("W-EXCITATION", key, text, remedy=remedy)
 
 
 def gearbox_response_warnings(data: xr.Dataset) -> Iterator[Finding]:
@@ -350,16 +383,7 @@ def gearbox_response_warnings(data: xr.Dataset) -> Iterator[Finding]:
             text = f"{outer.max():.2g} of the mesh forces of {stage} are at the outermost side bands"
             yield Finding("W-TAIL", "dynamics.side_bands", text, remedy="more of them")
         yield from _short_excitation(data, number, stage)
-    if "level_change" in data:
-        change = np.nan_to_num(np.abs(data["level_change"].values), posinf=0.0)
-        if change.max(initial=0.0) > _CHANGE:
-            speed, sensor = np.unravel_index(int(change.argmax()), change.shape)
-            text = (
-                f"the upper half of the excitation, to {_reach(data)}, changes the level of "
-                f"{data['sensor'].values[sensor]} at {speeds[speed]:.5g} rpm by {change.max():.2g} dB"
-            )
-            key, remedy = _end_of_excitation(data)
-            yield Finding("W-EXCITATION", key, text, remedy=remedy)
+    yield from _level_excitation(data)
     if "cross_excitation" in data and data["cross_excitation"].max() > _CROSS:
         yield _cross_finding(data)
     if missed := int(data.attrs.get("unresolved_resonances", 0)):
@@ -377,6 +401,11 @@ def _reach(data: xr.Dataset) -> str:
     """Words for the reach of the excitation."""
     most = int(data.attrs.get("most_harmonics", 0))
     return f"{1e-3 * data.attrs['up_to']:g} kHz" + (f", at most {most} mesh harmonics" if most else "")
+
+
+def _compared_to(data: xr.Dataset) -> str:
+    """Words for the end of the longer excitation."""
+    return f"{1e-3 * data.attrs['compared_to']:.3g} kHz"
 
 
 def _cross_finding(data: xr.Dataset) -> Finding:

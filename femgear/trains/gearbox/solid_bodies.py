@@ -30,7 +30,7 @@ from femgear.trains.gearbox.case_file import (
     PairSection,
     teeth_of,
 )
-from femgear.trains.gearbox.casing import bearing_name
+from femgear.trains.gearbox.casing import bearing_name, called
 from femgear.trains.gearbox.geometry import StageSizes, carriers, pair_sizes, planet_radius, set_sizes
 from femgear.trains.gearbox.power import gearbox_flow
 
@@ -156,7 +156,9 @@ def _of_bearings(case: GearboxCase) -> Iterator[SpaceBody]:
         else:
             continue
         axis, ends = (shaft.axis[0], shaft.axis[1]), (z - 0.5 * width, z + 0.5 * width)
-        yield SpaceBody(f"bearing {bearing_name(section, number)}", "bearing", shaft.name, axis, ends, (radii, radii))
+        yield SpaceBody(
+            called("bearing", bearing_name(section, number)), "bearing", shaft.name, axis, ends, (radii, radii)
+        )
 
 
 @dataclass(frozen=True)

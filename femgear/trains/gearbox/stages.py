@@ -29,6 +29,7 @@ from femgear.trains.gearbox.deflection import Deflection, check_held, solve_defl
 from femgear.trains.gearbox.friction import box_friction_findings, friction_excites
 from femgear.trains.gearbox.judgements import gearbox_judgements
 from femgear.trains.gearbox.key_figures import gearbox_key_figures
+from femgear.trains.gearbox.longer_excitation import longer_excitation
 from femgear.trains.gearbox.losses import BOX_HEAT, BOX_LOSSES, idle_loss_entries, unknown_mesh_losses
 from femgear.trains.gearbox.model import reference_shaft
 from femgear.trains.gearbox.modes import solve_gearbox_modes
@@ -119,7 +120,8 @@ def solve_box_dynamics(
     speed = [abs(state.model.flow.speed[reference_shaft(state.model)])]
     response = solve_gearbox_response(state, speed, steps=steps, progress=progress, by_path=True)
     without = solve_gearbox_response(state, speed, steps=steps, friction=False) if friction_excites(case) else None
-    return GearboxResponseResult(response, whole=True, frictionless=without)
+    longer = longer_excitation(response, steps=steps)
+    return GearboxResponseResult(response, whole=True, frictionless=without, longer=longer)
 
 
 @one_blas_thread()
@@ -137,7 +139,8 @@ def solve_box_runup(
     resonances = gearbox_resonances(state, start, stop, steps=steps)
     speeds, missed = run_up_speeds(equal_steps, resonances)
     found = solve_gearbox_response(state, speeds, steps=steps, progress=progress, stage="runup")
-    return GearboxResponseResult(found, whole=False, unresolved=missed, resonances=resonances)
+    longer = longer_excitation(found, steps=steps)
+    return GearboxResponseResult(found, whole=False, unresolved=missed, resonances=resonances, longer=longer)
 
 
 @one_blas_thread()
@@ -146,9 +149,12 @@ def solve_box_balance(
 ) -> GearboxBalanceResult:
     """Solve for motions with teeth that part at the speed of the chosen load case, stage by stage."""
     rings = tuple(f"ring of {stage.name}" for stage in case.planetary if stage.elastic_ring)
-    state, sensors = deflection.of(case).state, tuple(sensor.name for sensor in gearbox_sensors(case))
-    stages = tuple(solve_balance(state, steps=steps, progress=progress))
-    return GearboxBalanceResult(stages, rings, sensors, case.balance.together)
+    state, sensors = deflection.of(case).state, gearbox_sensors(case)
+    # rings are rigid here: sensors on them hear nothing that could be told
+    heard = [number for number, sensor in enumerate(sensors) if not sensor.ring]
+    solved = solve_balance(state, steps=steps, progress=progress)
+    stages = tuple(replace(stage, acceleration=stage.acceleration[heard]) for stage in solved)
+    return GearboxBalanceResult(stages, rings, tuple(sensors[number].name for number in heard), case.balance.together)
 
 
 def _no_balance(case: GearboxCase) -> str:

@@ -21,12 +21,10 @@ from femgear.stages.planet_bearings import planet_bearing_rows
 from femgear.trains.gearbox.casing_results import largest_foot_force
 from femgear.trains.gearbox.life import shortest_life
 from femgear.trains.gearbox.mode_words import mesh_lines_and_modes, nearest_mode
-from femgear.trains.gearbox.response_results import line_origin, main_way
+from femgear.trains.gearbox.response_results import SENSORS_JUDGED, line_origin, main_way
 from femgear.trains.gearbox.strength import smallest_safeties
 from femgear.trains.gearbox.stress import box_reason_rows
 
-SENSORS_JUDGED = 3
-"""Sensors in the verdict, at most: the loudest ones."""
 _ROUNDING = 1e-9
 """Share of the mesh forces under which the force of a bearing is rounding: planets balance one another."""
 _OF_TEETH = "W-PASSES", "W-DEFLECTION", "W-STIFFNESS", "W-FACE-LOAD", "W-OPEN"
@@ -123,7 +121,8 @@ def level_text(level: float) -> str:
 def _level_codes(data: Any, speed: int, sensor: int) -> tuple[str, ...]:
     """Codes of the findings that concern the level of a sensor at a speed, by their numbers."""
     missing = ("W-EXCITATION",) if data.attrs["missing"] else ()
-    return *missing, *doubtful_excitation(float(data["level_change"].values[speed, sensor])), *_OF_RESPONSE
+    change = float(data["level_change"].values[speed, sensor]) if "level_change" in data else math.nan
+    return *missing, *(() if math.isnan(change) else doubtful_excitation(change)), *_OF_RESPONSE
 
 
 def _judged(data: Any) -> list[int]:

@@ -65,5 +65,11 @@ def test_bearings_are_not_called_as_other_seats():
     assert problems(tables) == {"operation.fixed": "E-DUPLICATE"}
 
 
+def test_a_sensor_far_from_the_casing_is_refused():
+    tables = pair_tables() | {"casing": casing_tables()}
+    tables["sensor"] = [{"name": "top", "position": ["0 mm", "80 m", "0 mm"], "direction": "y"}]
+    assert problems(tables) == {"sensor[0].position": "E-RANGE"}
+
+
 def test_no_casing_is_no_fault():
     assert list(check_casing(read_case(pair_tables()))) == []

@@ -129,6 +129,14 @@ def test_the_right_outer_position_is_offered():
     )
     tables["bearing"][1] |= {"outer_shaft": "hollow", "outer_position": "10 mm"}
     assert '"65 mm"' in str(problems(tables)["bearing[1].outer_position"])
+    # the inner ring sits before the hollow shaft begins, and nowhere beside one that begins behind
+    tables["bearing"][1]["position"] = "5 mm"
+    remedy = problems(tables)["bearing[1].outer_position"].remedy
+    assert remedy == 'at z = 20 mm both are: position = "20 mm", outer_position = "0 mm"'
+    tables["shaft"][2]["start"] = "200 mm"
+    assert "nowhere beside one another" in problems(tables)["bearing[1].outer_position"].remedy
+    tables["bearing"][1] |= {"outer_shaft": "output"}
+    assert problems(tables)["bearing[1].outer_position"].remedy.endswith("give output the axis of input")
 
 
 def test_refusals_speak_the_words_of_the_file():

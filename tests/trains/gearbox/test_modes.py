@@ -7,6 +7,7 @@ import pytest
 from published.multistage_example import four_stage_case
 from small_gearbox import pair_tables, planetary_tables
 
+from femgear.errors import CaseError
 from femgear.trains.gearbox.deflection import solve_deflection
 from femgear.trains.gearbox.modes import GearboxModes, excitation_orders, linear_system, solve_gearbox_modes
 from femgear.trains.reading import read_case, with_values
@@ -29,6 +30,14 @@ def test_strain_energy_is_kinetic_energy(found):
     approach = assembly.columns.T @ found.motion
     energy = np.einsum("im,ij,jm->m", found.motion, assembly.stiffness, found.motion) + stiffness @ approach**2
     assert energy == pytest.approx((2.0 * np.pi * found.modes.frequency) ** 2, rel=1e-8, abs=1.0)
+
+
+def test_a_shaft_without_mass_has_no_modes():
+    tables = pair_tables()
+    tables["shaft"][1]["material"] = {"density": "0 kg/m^3"}
+    with pytest.raises(CaseError) as refused:
+        modes_of(tables)
+    assert (refused.value.code, refused.value.key) == ("E-MASS", "shaft[1].material.density")
 
 
 def test_a_shaft_on_a_soft_axial_bearing_swings_along_its_axis(found):

@@ -27,6 +27,8 @@ def test_a_pair_turns_and_carries_by_its_teeth():
     assert flow.port_torque == pytest.approx({"motor": 100.0, "brake": 150.0}, rel=1e-15)
     assert flow.mesh_frequency == pytest.approx({"stage": 400.0}, rel=1e-12)
     assert turns_in_words(flow.frequencies["stage"]) == "3 and 2 turns, 0.18 s"
+    still = replace(flow.frequencies["stage"], hunting_time={"mesh": math.inf}, hunting_turns={"mesh": (3, 2)})
+    assert turns_in_words(still) == "3 and 2 turns"
 
 
 def test_the_electric_axle():

@@ -20,7 +20,7 @@ from femgear.trains.gearbox.response_results import (
 
 @pytest.fixture
 def data():
-    return GearboxResponseResult(response(), whole=True).dataset()
+    return GearboxResponseResult(response(), whole=True, longer=response()).dataset()
 
 
 def codes(data) -> list[str]:
@@ -81,12 +81,10 @@ def test_side_bands_are_turns_of_the_carrier(data):
 
 
 def test_nothing_is_said_of_a_quiet_response(data):
-    data["level_change"].values[:] = 0.0
     assert codes(data) == []
 
 
 def test_flanks_that_would_part_are_told(data):
-    data["level_change"].values[:] = 0.0
     data["lowest_force"].values[1, 0, 0] = -1.0
     (finding,) = gearbox_response_warnings(data)
     assert finding.code == "W-PULL"
@@ -95,16 +93,14 @@ def test_flanks_that_would_part_are_told(data):
 
 def test_side_bands_and_an_excitation_that_end_too_early_are_told(data):
     data["outer"].values[0, 0] = 0.1
-    data["level_change"].values[:] = 0.0
-    data["level_change"].values[1, 2] = -0.7
+    change = xr.DataArray([[np.nan] * 3, [0.1, 0.1, -0.7]], dims=("speed", "sensor"))
+    data = data.assign(level_change=change).assign_attrs(compared_to=6e3)
     assert codes(data) == ["W-TAIL", "W-EXCITATION"]
-    assert "0.7 dB" in list(gearbox_response_warnings(data))[1].text
+    text = list(gearbox_response_warnings(data))[1].text
+    assert text == "excitation to 6 kHz in place of 3 kHz changes the level of z at 2500 rpm by -0.7 dB"
 
 
 def test_stages_that_change_one_another_are_told(data):
-    import xarray as xr
-
-    data["level_change"].values[:] = 0.0
     cross = xr.DataArray(np.array([[[0.0]], [[0.2]]]), dims=("speed", "stage", "other_stage"))
     (finding,) = gearbox_response_warnings(data.assign(cross_excitation=cross))
     assert finding.code == "W-CROSS"
@@ -113,7 +109,6 @@ def test_stages_that_change_one_another_are_told(data):
 
 
 def test_peaks_between_the_speeds_of_a_run_up_are_told(data):
-    data["level_change"].values[:] = 0.0
     assert data.attrs["unresolved_resonances"] == 0
     data.attrs["unresolved_resonances"] = 3
     (finding,) = gearbox_response_warnings(data)
@@ -122,7 +117,6 @@ def test_peaks_between_the_speeds_of_a_run_up_are_told(data):
 
 
 def test_stages_without_teeth_are_told(data):
-    data["level_change"].values[:] = 0.0
     data.attrs["missing"] = "second stage"
     (finding,) = gearbox_response_warnings(data)
     assert finding.code == "W-EXCITATION"
@@ -130,23 +124,24 @@ def test_stages_without_teeth_are_told(data):
 
 
 def test_bodies_that_are_elastic_in_modes_alone_are_told(data):
-    data["level_change"].values[:] = 0.0
     assert data.attrs["rigid"] == ""
     data.attrs["rigid"] = "ring of second stage"
     assert codes(data) == ["W-RIGID"]
 
 
-def test_a_response_of_few_harmonics_tells_what_its_upper_half_does():
+def test_a_response_of_few_harmonics_tells_what_a_longer_excitation_does():
     found = pair_in_a_casing()
     dynamics = found.model.case.dynamics.model_copy(update={"mesh_harmonics": 2})
     case = found.model.case.model_copy(update={"dynamics": dynamics})
     found = replace(found, model=replace(found.model, case=case))
-    few = GearboxResponseResult(solve_gearbox_response(found, [1000.0 * RPM]), whole=True).dataset()
-    assert few["harmonic"].values.tolist() == [1, 2]
-    lines = np.hypot(few["lines_real"], few["lines_imag"]).values[0]
-    first = lines[:, 0] / np.sqrt((lines**2).sum(axis=1))
-    assert few["level_change"].values[0] == pytest.approx(-20.0 * np.log10(first))
-    (finding,) = [one for one in gearbox_response_warnings(few) if one.code == "W-EXCITATION"]
+    longer = solve_gearbox_response(pair_in_a_casing(), [1000.0 * RPM])
+    data = GearboxResponseResult(solve_gearbox_response(found, [1000.0 * RPM]), whole=True, longer=longer).dataset()
+    assert data["harmonic"].values.tolist() == [1, 2]
+    whole = GearboxResponseResult(longer, whole=True).dataset()
+    change = 20.0 * np.log10(whole["level"].values[0] / data["level"].values[0])
+    assert data["level_change"].values[0] == pytest.approx(change)
+    assert data["longer_dynamic_factor"].values[0, 0, 0] == whole["dynamic_factor"].values[0, 0, 0]
+    (finding,) = [one for one in gearbox_response_warnings(data) if one.code == "W-EXCITATION"]
     assert finding.key == "dynamics.mesh_harmonics" and "at most 2 mesh harmonics" in finding.text
 
 
@@ -154,23 +149,27 @@ def small_response(**changes):
     """Two speeds of one stage at one sensor, whose level comes by two ways."""
     values = {
         "dynamic_factor": (("speed", "stage", "kind"), [[[1.5, np.nan]], [[1.02, np.nan]]]),
-        "tail": (("speed", "stage"), [[0.8], [0.9]]),
+        "longer_dynamic_factor": (("speed", "stage", "kind"), [[[1.8, np.nan]], [[np.nan, np.nan]]]),
         "outer": (("speed", "stage"), [[0.0], [0.0]]),
         "lowest_force": (("speed", "stage", "kind"), [[[10.0, np.nan]], [[10.0, np.nan]]]),
         "path_share": (("speed", "path", "sensor"), [[[0.7], [0.3]], [[0.7], [0.3]]]),
     }
     coordinates = {"speed": [1000.0, 2000.0], "stage": ["first"], "path": ["bearing A", "bearing B"], "sensor": ["top"]}
-    attributes = {"up_to": 2e4, "rigid": "", "missing": ""}
+    attributes = {"up_to": 2e4, "compared_to": 4e4, "rigid": "", "missing": ""}
     return xr.Dataset(values | changes, coordinates, attributes)
 
 
-def test_forces_that_rest_on_the_end_of_the_excitation_are_told():
+def test_forces_that_a_longer_excitation_changes_are_told():
     (finding,) = gearbox_response_warnings(small_response())
     assert (finding.code, finding.key) == ("W-TAIL", "dynamics.up_to")
-    assert "to 20 kHz, makes 80%" in finding.text and "at 1000 rpm: K_v 1.5" in finding.text
-    # 0.8 of a fluctuation of 4 % of the force is within five per cent of it
-    small = (("speed", "stage", "kind"), [[[1.04, np.nan]], [[1.02, np.nan]]])
-    assert not [*gearbox_response_warnings(small_response(dynamic_factor=small))]
+    assert finding.text == ("excitation to 40 kHz in place of 20 kHz changes K_v of first at 1000 rpm from 1.5 to 1.8")
+    small = (("speed", "stage", "kind"), [[[1.55, np.nan]], [[np.nan, np.nan]]])
+    assert not [*gearbox_response_warnings(small_response(longer_dynamic_factor=small))]
+    former = small_response().drop_vars("longer_dynamic_factor")
+    (unsolved,) = gearbox_response_warnings(former.assign_attrs(compared_to=np.nan))
+    assert (unsolved.code, unsolved.key) == ("W-TAIL", "modes.damping_ratio")
+    del former.attrs["compared_to"]
+    assert not [*gearbox_response_warnings(former)]
 
 
 def test_ways_that_cancel_have_no_share():
