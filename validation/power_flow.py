@@ -7,6 +7,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from fractions import Fraction as F
 
+from set_conditions import ravigneaux_conditions, stepped_condition
+
 from femgear.errors import CaseError
 from femgear.gears.power_flow import (
     PowerFlow,
@@ -14,8 +16,6 @@ from femgear.gears.power_flow import (
     pair_condition,
     planetary_condition,
     power_flow,
-    ravigneaux_conditions,
-    stepped_condition,
 )
 from femgear.gears.stage_frequencies import stage_frequencies
 from validation.rows import Row, at_most, counted, printed, within

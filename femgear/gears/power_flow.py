@@ -126,59 +126,6 @@ def planetary_condition(
     )
 
 
-def stepped_condition(
-    name: str,
-    sun: str | None,
-    carrier: str | None,
-    ring: str | None,
-    sun_teeth: int,
-    first_planet_teeth: int,
-    second_planet_teeth: int,
-    ring_teeth: int,
-) -> SpeedCondition:
-    """Tie the speeds of a planetary set with stepped planets.
-
-    The sun meshes with the first gear of the planets, the ring with the second:
-    ``z_s z_p2 (w_s - w_c) + z_p1 z_r (w_r - w_c) = 0``. A shaft that is None is the casing.
-
-    GeometryError: tooth numbers that are not positive whole numbers (E-TEETH).
-    """
-    teeth = {"sun": sun_teeth, "first planet": first_planet_teeth, "second planet": second_planet_teeth}
-    teeth["ring"] = ring_teeth
-    _check_teeth(name, {f"{gear.replace(' ', '_')}_teeth": count for gear, count in teeth.items()})
-    on_sun, on_ring = sun_teeth * second_planet_teeth, first_planet_teeth * ring_teeth
-    return _condition(
-        name,
-        tuple(zip((sun, ring, carrier), willis_weights(on_sun, on_ring), strict=True)),
-        StageGears(
-            teeth,
-            {"sun": sun, "carrier": carrier, "ring": ring},
-            (("sun", "first planet", EXTERNAL), ("second planet", "ring", INTERNAL)),
-            (("first planet", "second planet"),),
-        ),
-    )
-
-
-def ravigneaux_conditions(
-    name: str,
-    small_sun: str | None,
-    large_sun: str | None,
-    carrier: str | None,
-    ring: str | None,
-    small_sun_teeth: int,
-    large_sun_teeth: int,
-    ring_teeth: int,
-) -> tuple[SpeedCondition, SpeedCondition]:
-    """Tie the speeds of a Ravigneaux set, which has two suns, one carrier and one ring.
-
-    The small sun drives the ring through short and long planets, the large sun through the long ones alone. The two
-    conditions are named after the set and its suns. GeometryError as of `planetary_condition`.
-    """
-    small = planetary_condition(f"{name} small sun", small_sun, carrier, ring, small_sun_teeth, ring_teeth, double=True)
-    large = planetary_condition(f"{name} large sun", large_sun, carrier, ring, large_sun_teeth, ring_teeth)
-    return small, large
-
-
 def power_flow(
     shafts: Sequence[str],
     conditions: Sequence[SpeedCondition],

@@ -9,15 +9,17 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from itertools import product
+from typing import Any
 
 from femgear.errors import GeometryError
 from femgear.gears.gear import Gear
 from femgear.gears.iso6336 import contact_safety, nominal_contact_stress, root_safety, single_pair_factors
 from femgear.gears.iso6336_root import nominal_root_stress
 from femgear.gears.pair import GearPair
+from femgear.gears.paired_planets import PAIRED, have_room, paired_ratio, paired_teeth, planet_places
 from femgear.gears.planet_assembly import assembly_step, stepped_gears
 from femgear.gears.profile import BasicRack
 from femgear.gears.shifts import share_shifts
@@ -26,12 +28,26 @@ KINDS = {
     "planetary": ("sun", "planet", "ring"),
     "pair": ("gear 1", "gear 2"),
     "stepped": ("sun", "first planet", "second planet", "ring"),
+    "double": ("sun", "inner planet", "outer planet", "ring"),
+    "ravigneaux": ("small sun", "large sun", "short planet", "long planet", "ring"),
 }
 """Kinds of gears that are searched, with the names of their gears."""
 LEAST_TEETH, MOST_SUN_TEETH, MOST_PLANET_TEETH, MOST_TEETH = 14, 60, 120, 300
 """Fewest teeth of a gear, most of a sun or pinion (of a second planet gear too), of planets, of any gear."""
 LEAST_UNSHIFTED = 17
 """Fewest teeth without shift: fewer are undercut at 20 degrees."""
+_MESHES = {
+    "planetary": ((0, 1), (1, 2)),
+    "pair": ((0, 1),),
+    "stepped": ((0, 1), (2, 3)),
+    "double": ((0, 1), (1, 2), (2, 3)),
+    "ravigneaux": ((0, 2), (2, 3), (1, 3), (3, 4)),
+}
+"""Both gears of every mesh by their numbers; the ring comes last."""
+_TWO_MESHES = ("planet", "inner planet", "outer planet", "short planet", "long planet")
+"""Planets whose teeth are bent both ways."""
+_PLANES = {"ravigneaux": 2}
+"""Gear planes of sets whose gears have one width, where these are several."""
 MODULE_RATIOS = (0.6, 1.6)
 """Module of the second gear of a stepped planet over that of the first."""
 _ANGLE, _RACK, _UNIT, _RIM = math.radians(20.0), BasicRack(1.0, 1.25, 0.25), 1e-3, 3.0
@@ -52,8 +68,9 @@ class ToothDemand:
         Largest relative deviation from the ratio.
     planets : tuple of int
         Numbers of planets to try, equally spaced.
-    fixed : {"ring", "carrier", "sun"}
-        Member of a set that stands; the sun drives, or the ring where the sun stands.
+    fixed : {"ring", "carrier", "sun"}, optional
+        Member of a set that stands; the sun drives, or the ring where the sun stands. Of a Ravigneaux set the small sun
+        drives and ``sun`` is the large one. By default the ring, of a Ravigneaux set the large sun.
     torque : float
         On sun or gear 1 [N m]; the sizes go with its third root, their order does not depend on it.
     width_ratio : float
@@ -72,7 +89,7 @@ class ToothDemand:
     kind: str = "planetary"
     tolerance: float = 0.02
     planets: tuple[int, ...] = (3,)
-    fixed: str = "ring"
+    fixed: str | None = None
     torque: float = 100.0
     width_ratio: float = 0.8
     contact_limit: float = 1500e6
@@ -81,6 +98,11 @@ class ToothDemand:
     contact_safety: float = 1.1
     root_safety: float = 1.4
     most: int = 10_000
+
+    @property
+    def stands(self) -> str:
+        """Member of a set that stands."""
+        return self.fixed or ("sun" if self.kind == "ravigneaux" else "ring")
 
 
 @dataclass(frozen=True)
@@ -97,6 +119,8 @@ class SizedTeeth:
         Number of branches; 1 of a pair.
     ratio : float
         See `ToothDemand`.
+    torques : tuple of float
+        On the first gear of every mesh of one branch, without losses [N m].
     modules : tuple of float
         Of every mesh with one of its own [m].
     widths : tuple of float
@@ -121,6 +145,7 @@ class SizedTeeth:
     teeth: tuple[int, ...]
     planets: int
     ratio: float
+    torques: tuple[float, ...]
     modules: tuple[float, ...]
     widths: tuple[float, ...]
     diameter: float
@@ -134,21 +159,24 @@ class SizedTeeth:
 
 @dataclass(frozen=True)
 class _UnitMesh:
-    """A mesh of gears whose first module is 1 mm.
+    """A mesh of gears of a module of 1 mm, under a unit force over a unit width.
 
     Parameters
     ----------
     pair : GearPair
         Both gears.
-    torque : float
-        On gear 1, over that of the driver in one branch [1].
-    names : (str, str)
-        Of both gears in words.
+    root : (2,) tuple of float
+        Nominal root stress of either gear by the tangential force over the face width [Pa m/N].
+    flank : float
+        Nominal contact stress at the place that decides, squared, by the same [Pa^2 m/N].
+    scale : float
+        Module of this mesh over that of the first one of its set [1].
     """
 
     pair: GearPair
-    torque: float
-    names: tuple[str, str]
+    root: tuple[float, float]
+    flank: float
+    scale: float = 1.0
 
 
 def search_teeth(
@@ -188,7 +216,8 @@ def search_teeth(
 
 def candidates(demand: ToothDemand) -> list[tuple[tuple[int, ...], int]]:
     """List teeth and numbers of planets of the ratio that assemble, nearest ratio first."""
-    listed = {"pair": _pairs, "planetary": _sets, "stepped": _stepped_sets}[demand.kind](demand)
+    kinds = {"pair": _pairs, "planetary": _sets, "stepped": _stepped_sets}
+    listed = kinds.get(demand.kind, _paired_sets)(demand)
     return sorted(listed, key=lambda teeth: (round(abs(_ratio(demand, teeth[0]) / demand.ratio - 1.0), 9), teeth))
 
 
@@ -199,34 +228,34 @@ def size_of(demand: ToothDemand, teeth: tuple[int, ...], planets: int) -> SizedT
     than a module (E-NEIGHBOURS).
     """
     meshes, lacks = _closed(demand.kind, teeth)
-    of_set = demand.kind != "pair"
-    _check_room(meshes, planets)
+    of_set, own_widths = demand.kind != "pair", demand.kind == "stepped"
+    if demand.kind in PAIRED:
+        _check_paired(teeth, planets)
+    else:
+        _check_room(meshes, planets)
     widths = [
-        demand.width_ratio * 2.0 * min(g.reference_radius for g in m.pair.gears if not g.internal) for m in meshes
+        demand.width_ratio * 2.0 * m.scale * min(g.reference_radius for g in m.pair.gears if not g.internal)
+        for m in meshes
     ]
-    if demand.kind == "planetary":
-        widths = [min(widths)] * 2
-    needs = [
-        need
-        for mesh, width in zip(meshes, widths, strict=True)
-        for need in _needed(demand, mesh, demand.torque / planets, width)
-    ]
-    scale, decides = max(needs)
-    of_modules = meshes if demand.kind == "stepped" else meshes[:1]
-    widths = widths if demand.kind == "stepped" else widths[:1]
-    diameter, volume = _envelope(meshes, widths) if of_set else _pair_envelope(meshes[0].pair, widths[0])
+    widths = widths if own_widths else [min(widths)] * len(meshes)
+    torques = tuple(demand.torque / planets * share for share in _torques(demand, teeth))
+    scale, decides = max(_needs(demand, meshes, widths, torques))
+    of_modules, widths = (meshes, widths) if own_widths else (meshes[:1], widths[:1])
+    along = widths * _PLANES.get(demand.kind, 1)
+    diameter, volume = _envelope(meshes, along) if of_set else _pair_envelope(meshes[0].pair, widths[0])
     return SizedTeeth(
         kind=demand.kind,
         teeth=teeth,
         planets=planets,
         ratio=_ratio(demand, teeth),
-        modules=tuple(scale * mesh.pair.gear_1.module for mesh in of_modules),
+        torques=torques,
+        modules=tuple(scale * mesh.scale * mesh.pair.gear_1.module for mesh in of_modules),
         widths=tuple(scale * width for width in widths),
         diameter=scale * diameter,
         volume=scale**3 * volume,
         decides=decides,
         contact_ratio=tuple(mesh.pair.contact_ratio for mesh in meshes),
-        left=tuple(_left(z, planets) for z in ((teeth[0], teeth[-1]) if of_set else ())),
+        left=tuple(_left(z, planets) for z in _central_teeth(demand.kind, teeth)),
         hunting=all(math.gcd(*(gear.teeth for gear in mesh.pair.gears)) == 1 for mesh in meshes),
         lacks=lacks,
     )
@@ -258,11 +287,23 @@ def _stepped_sets(demand: ToothDemand) -> Iterator[tuple[tuple[int, ...], int]]:
                 yield from (((sun, first, second, ring), n) for n in demand.planets if (total / n).denominator == 1)
 
 
+def _paired_sets(demand: ToothDemand) -> Iterator[tuple[tuple[int, ...], int]]:
+    suns = range(LEAST_UNSHIFTED, MOST_SUN_TEETH + 1)
+    others = range(LEAST_UNSHIFTED, MOST_SUN_TEETH // 2 + 1)
+    return paired_teeth(demand.kind, demand.stands, _limits(demand), demand.planets, suns, others)
+
+
+def _limits(demand: ToothDemand) -> tuple[float, float]:
+    """Least and largest ratio that is taken."""
+    away = demand.tolerance + 1e-12
+    return demand.ratio * (1.0 - away), demand.ratio * (1.0 + away)
+
+
 def _near(demand: ToothDemand, unit: float) -> range:
     """Teeth of the last gear whose ratio with those of all others, as one number, is near the wanted one."""
     ratios = [demand.ratio * (1.0 + side * demand.tolerance) for side in (-1.0, 1.0)]
     if demand.kind != "pair":
-        ratios = sorted(_inner_ratio(ratio, demand.fixed) for ratio in ratios)
+        ratios = sorted(_inner_ratio(ratio, demand.stands) for ratio in ratios)
     return range(
         max(math.ceil(ratios[0] * unit - 1e-9), LEAST_TEETH), min(int(ratios[1] * unit + 1e-9), MOST_TEETH) + 1
     )
@@ -276,8 +317,16 @@ def _inner_ratio(ratio: float, fixed: str) -> float:
 def _ratio(demand: ToothDemand, teeth: tuple[int, ...]) -> float:
     if demand.kind == "pair":
         return teeth[1] / teeth[0]
+    if demand.kind in PAIRED:
+        return paired_ratio(teeth, demand.stands)
     inner = teeth[-1] / teeth[0] * (teeth[1] / teeth[2] if demand.kind == "stepped" else 1.0)
-    return {"ring": 1.0 + inner, "carrier": inner, "sun": 1.0 + 1.0 / inner}[demand.fixed]
+    return {"ring": 1.0 + inner, "carrier": inner, "sun": 1.0 + 1.0 / inner}[demand.stands]
+
+
+def _central_teeth(kind: str, teeth: tuple[int, ...]) -> tuple[int, ...]:
+    """Teeth of suns and rings."""
+    numbers = (n for n, name in enumerate(KINDS[kind]) if name.endswith(("sun", "ring")))
+    return tuple(teeth[number] for number in numbers)
 
 
 def _left(teeth: int, planets: int) -> str:
@@ -289,31 +338,29 @@ def _left(teeth: int, planets: int) -> str:
 @lru_cache(maxsize=20_000)
 def _closed(kind: str, teeth: tuple[int, ...]) -> tuple[tuple[_UnitMesh, ...], tuple[str, ...]]:
     """Meshes of closed gears, and what these lack."""
-    if kind == "stepped":
-        sun, first, second, ring = teeth
-        module = _UNIT * (sun + first) / (ring - second)
-        pairs = _standard_pair((sun, first), _UNIT), _standard_pair((second, ring), module, internal=True)
-        lacks = ()
-    else:
+    if kind in ("planetary", "pair"):
         shared = share_shifts(teeth, _ANGLE, _RACK)
-        pairs, lacks = shared.gears.kinds, shared.lacks
-    names = KINDS[kind]
-    meshes = [_UnitMesh(pairs[0], 1.0, (names[0], names[1]))]
-    if len(pairs) == 2:
-        meshes.append(_UnitMesh(pairs[1], teeth[1] / teeth[0], (names[-2], names[-1])))
-    return tuple(meshes), lacks
+        return tuple(_unit_mesh(pair) for pair in shared.gears.kinds), shared.lacks
+    names, meshes = KINDS[kind], list[_UnitMesh]()
+    for first, second in _MESHES[kind]:
+        # a stepped planet has one centre distance, whatever the teeth of its second gear
+        step = (teeth[0] + teeth[1]) / (teeth[3] - teeth[2]) if (kind, first) == ("stepped", 2) else 1.0
+        mesh = _standard_mesh((teeth[first], teeth[second]), internal=names[second] == "ring")
+        meshes.append(replace(mesh, scale=step))
+    return tuple(meshes), ()
 
 
-def _standard_pair(teeth: tuple[int, int], module: float, *, internal: bool = False) -> GearPair:
+@lru_cache(maxsize=20_000)
+def _standard_mesh(teeth: tuple[int, int], *, internal: bool) -> _UnitMesh:
     """Gears without shift at their reference centre distance."""
     gears = [
         Gear(
             z,
-            module,
+            _UNIT,
             _ANGLE,
             0.0,
             10.0 * _UNIT,
-            module * (0.5 * z + 8.0 if inside else 0.05 * z),
+            _UNIT * (0.5 * z + 8.0 if inside else 0.05 * z),
             internal=inside,
             rack=_RACK,
             name=f"gear_{number}",
@@ -321,34 +368,63 @@ def _standard_pair(teeth: tuple[int, int], module: float, *, internal: bool = Fa
         )
         for number, (z, inside) in enumerate(zip(teeth, (False, internal), strict=True), start=1)
     ]
-    return GearPair(gears[0], gears[1], 0.5 * module * (teeth[1] - teeth[0] if internal else sum(teeth)))
+    return _unit_mesh(GearPair(gears[0], gears[1], 0.5 * _UNIT * (teeth[1] - teeth[0] if internal else sum(teeth))))
 
 
-def _needed(demand: ToothDemand, mesh: _UnitMesh, torque: float, width: float) -> Iterator[tuple[float, str]]:
-    """Scale of these gears at which a mesh of a branch has each of its safeties, with the place of the stress."""
-    pair, gears = mesh.pair, mesh.pair.gears
-    force = torque * mesh.torque / pair.gear_1.base_radius * math.cos(pair.gear_1.pressure_angle)
-    # the gears are 10 mm wide, all stresses go with the reciprocal width, of flanks its root
-    narrow = pair.face_width / width
-    for gear, name in zip(gears, mesh.names, strict=True):
-        nominal = nominal_root_stress(gear, contact_ratio=pair.contact_ratio, tangential_force=force * narrow)
-        both_ways = name == "planet"
-        safety = root_safety(demand.root_limit, nominal.stress, demand.load_factor, reversed_bending=both_ways)
-        yield (demand.root_safety / safety) ** (1.0 / 3.0), f"root of {name}"
+def _unit_mesh(pair: GearPair) -> _UnitMesh:
+    """Rate a mesh under a unit force."""
+    gears = pair.gears
+    # on the width of the gears
+    force: dict[str, Any] = {"contact_ratio": pair.contact_ratio, "tangential_force": pair.face_width}
+    root = tuple(nominal_root_stress(gear, **force).stress for gear in gears)
     first, second = gears if gears[1].internal else sorted(gears, key=lambda gear: gear.teeth)
-    working = pair.working_pressure_angle
-    flank = nominal_contact_stress(
-        first,
-        second,
-        working_angle=working,
-        contact_ratio=pair.contact_ratio,
-        tangential_force=force * narrow,
-        youngs_modulus=_STEEL[0],
-        poisson_ratio=_STEEL[1],
-    )
+    working, steel = pair.working_pressure_angle, dict(zip(("youngs_modulus", "poisson_ratio"), _STEEL, strict=True))
+    flank = nominal_contact_stress(first, second, working_angle=working, **force, **steel)
     flank *= max(single_pair_factors(*gears, working_angle=working, path=pair.path))
-    safety = contact_safety(demand.contact_limit, flank, demand.load_factor)
-    yield (demand.contact_safety / safety) ** (2.0 / 3.0), f"flanks {'-'.join(mesh.names)}"
+    return _UnitMesh(pair, (root[0], root[1]), flank**2)
+
+
+def _torques(demand: ToothDemand, teeth: tuple[int, ...]) -> Iterator[float]:
+    """Torque on the first gear of every mesh over that on the sun, without losses [1]."""
+    if (demand.kind, demand.stands) == ("ravigneaux", "sun"):
+        small, _, short, long, ring = teeth
+        ratio = _ratio(demand, teeth)
+        # the carrier has no torque: those of both suns and the ring balance
+        yield from (1.0, short / small, ratio - 1.0, ratio * long / ring)
+        return
+    # one tangential force from the driven sun to the ring, a second sun turns along
+    for first, _ in _MESHES[demand.kind]:
+        idle = (demand.kind, first) == ("ravigneaux", 1)
+        driver = 1 if (demand.kind, first) == ("stepped", 2) else first
+        yield 0.0 if idle else teeth[driver] / teeth[0]
+
+
+def _needs(
+    demand: ToothDemand, meshes: Sequence[_UnitMesh], widths: Sequence[float], torques: Sequence[float]
+) -> Iterator[tuple[float, str]]:
+    """Scale of these gears at which every mesh of a branch has each of its safeties, with the place of the stress."""
+    for mesh, width, numbers, torque in zip(meshes, widths, _MESHES[demand.kind], torques, strict=True):
+        if not torque:
+            continue
+        names = [KINDS[demand.kind][number] for number in numbers]
+        over_width = torque / (mesh.scale * mesh.pair.gear_1.reference_radius) / width
+        for name, stress in zip(names, mesh.root, strict=True):
+            both_ways = name in _TWO_MESHES
+            safety = root_safety(
+                demand.root_limit, stress / mesh.scale * over_width, demand.load_factor, reversed_bending=both_ways
+            )
+            yield (demand.root_safety / safety) ** (1.0 / 3.0), f"root of {name}"
+        safety = contact_safety(
+            demand.contact_limit, math.sqrt(mesh.flank / mesh.scale * over_width), demand.load_factor
+        )
+        yield (demand.contact_safety / safety) ** (2.0 / 3.0), f"flanks {'-'.join(names)}"
+
+
+def _check_paired(teeth: tuple[int, ...], planets: int) -> None:
+    """Refuse planets in mesh that do not reach each other, or whose tips come nearer to others than a module."""
+    places = planet_places(teeth)
+    if places is None or not have_room(places, teeth[0], teeth[-1], planets):
+        raise GeometryError(f"{planets} branches have no room", code="E-NEIGHBOURS", limit="a module between tips")
 
 
 def _check_room(meshes: Sequence[_UnitMesh], planets: int) -> None:
@@ -356,16 +432,17 @@ def _check_room(meshes: Sequence[_UnitMesh], planets: int) -> None:
     if planets == 1:
         return
     centres = 2.0 * meshes[0].pair.centre_distance * math.sin(math.pi / planets)
-    for planet in (meshes[0].pair.gear_2, *(mesh.pair.gear_1 for mesh in meshes[1:])):
-        if centres - 2.0 * planet.tip_radius < planet.module:
+    planets_of = [(meshes[0].pair.gear_2, 1.0), *((mesh.pair.gear_1, mesh.scale) for mesh in meshes[1:])]
+    for planet, scale in planets_of:
+        if centres < scale * (2.0 * planet.tip_radius + planet.module):
             raise GeometryError(f"{planets} planets have no room", code="E-NEIGHBOURS", limit="a module between tips")
 
 
 def _envelope(meshes: Sequence[_UnitMesh], widths: Sequence[float]) -> tuple[float, float]:
     """Diameter and volume of the cylinder around a set [m, m^3]: ring and rim, or what planets reach beyond."""
-    planet, ring = meshes[0].pair.gear_2, meshes[-1].pair.gear_2
+    planet, ring, scale = meshes[0].pair.gear_2, meshes[-1].pair.gear_2, meshes[-1].scale
     reach = meshes[0].pair.centre_distance + planet.tip_radius
-    outer = max(ring.root_radius + _RIM * ring.module, reach)
+    outer = max(scale * (ring.root_radius + _RIM * ring.module), reach)
     return 2.0 * outer, math.pi * outer**2 * sum(widths)
 
 
@@ -380,9 +457,12 @@ def _check(demand: ToothDemand) -> None:
     if demand.kind not in KINDS:
         message, limit = f"teeth of a {demand.kind!r}", ", ".join(KINDS)
         raise GeometryError(message, code="E-CHOICE", key="--kind", value=demand.kind, limit=limit)
-    if demand.fixed not in ("ring", "carrier", "sun"):
+    if demand.stands not in ("ring", "carrier", "sun"):
         message, limit = "no member of a set", "ring, carrier, sun"
-        raise GeometryError(message, code="E-CHOICE", key="--fixed", value=demand.fixed, limit=limit)
+        raise GeometryError(message, code="E-CHOICE", key="--fixed", value=demand.stands, limit=limit)
+    if (demand.kind, demand.stands) == ("double", "sun"):
+        message, limit = "a ring that drives its carrier slower than this turns", "ring, carrier"
+        raise GeometryError(message, code="E-CHOICE", key="--fixed", value=demand.stands, limit=limit)
     numbers = {
         "--ratio": (demand.ratio, 1.0, 100.0),
         "--tolerance": (demand.tolerance, 0.0, 0.2),

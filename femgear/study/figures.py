@@ -214,6 +214,10 @@ def front_figure(values, dominated, before, *, names: Sequence[str], compromise:
     return figure
 
 
+LABEL_WIDTH, LABEL_HEIGHT, LABEL_LINE = 0.3, 0.06, 13.0
+"""Size of a name in `size_and_error` over the ranges of both axes, and the step from line to line [points]."""
+
+
 def size_and_error(
     volumes: Sequence[float],
     errors: Sequence[float],
@@ -252,9 +256,15 @@ def size_and_error(
     span = max(volumes) - min(volumes) or max(volumes)
     ax.set_xlim(min(volumes) - 0.25 * span, max(volumes) + 0.08 * span)
     # below the front, on the side of less volume, there are no other teeth
-    beside = {"xytext": (-6, -4), "textcoords": "offset points", "ha": "right", "va": "top"}
-    for place in front:
-        ax.annotate(names[place], (volumes[place], errors[place]), **beside)
+    lines = 0
+    for number, place in enumerate(front):
+        # a name beside another one has a line of its own
+        before = front[max(number - 1, 0)]
+        near = volumes[place] - volumes[before] < LABEL_WIDTH * span
+        near &= errors[before] - errors[place] < LABEL_HEIGHT * top
+        lines = lines + 1 if number and near else 0
+        at = {"xytext": (-6.0, -4.0 - LABEL_LINE * lines), "textcoords": "offset points"}
+        ax.annotate(names[place], (volumes[place], errors[place]), **at, ha="right", va="top")
     title = "what planets leave of the first mesh harmonic" if any(left) else ""
     label(ax, "volume [cm³]", "transmission error peak to peak [µm]", title)
     legend_below(figure)

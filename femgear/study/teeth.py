@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -24,6 +24,10 @@ from femgear.trains.drafts import new_case
 from femgear.trains.reading import parse_case
 
 _TABLE, _FIGURE = "teeth.csv", "teeth.png"
+_DRAFTED = {"stepped": ("ring",), "double": ("ring",), "ravigneaux": ("sun", "carrier")}
+"""Kinds whose cases are gearboxes, with the members that stand in these."""
+_MESHES = {"pair": 1, "double": 3, "ravigneaux": 4}
+"""Meshes of a branch, where these are not two."""
 _SHOWN = 12
 """Rows of the smallest teeth that are printed."""
 
@@ -38,13 +42,19 @@ class ComputedTeeth:
         Teeth and size.
     case : str
         Text of their case file.
-    error : float
-        Peak to peak of the static transmission error, on the base circle of sun or gear 1 [m].
+    errors : tuple of float
+        Peak to peak of the static transmission error, on the base circle of sun or gear 1 [m]; of a gearbox that of
+        every mesh alone, on the base circle of its first gear.
     """
 
     choice: SizedTeeth
     case: str
-    error: float
+    errors: tuple[float, ...]
+
+    @property
+    def error(self) -> float:
+        """Largest of the errors [m]."""
+        return max(self.errors)
 
 
 @one_blas_thread()
@@ -81,11 +91,7 @@ def teeth_into(
     sized, beyond = search_teeth(demand, progress=lambda done, total: progress("teeth", done, total))
     write_csv(folder / _TABLE, _header(demand), map(_record, sized))
     names, blocks = [_TABLE], [_described(demand, sized, beyond)]
-    if demand.kind == "stepped":
-        # drafts of stepped sets have a ring that stands
-        for choice in best_of_every_phasing(sized, wanted.best) if demand.fixed == "ring" else ():
-            names.append(f"{_label(choice, '_')}.toml")
-            write_text(case_of(demand, choice), folder / names[-1])
+    if demand.stands not in _DRAFTED.get(demand.kind, (demand.stands,)):
         return blocks, names
     computed, refused = _computed(demand, best_of_every_phasing(sized, wanted.best), wanted, cache, progress)
     for teeth in computed:
@@ -165,20 +171,35 @@ def _computed(
 ) -> tuple[list[ComputedTeeth], list[str]]:
     """Static transmission errors on a coarse grid, and why teeth have none that ISO 6336 rates."""
     computed, refused = list[ComputedTeeth](), list[str]()
-    grid = {"positions": wanted.positions, "flank_elements": wanted.flank_elements, "stresses": False}
     for number, choice in enumerate(teeth):
         progress("transmission error", number, len(teeth))
         try:
             text = case_of(demand, choice)
-            tables = case_text.parse(text, "")
-            tables["static"] = tables.get("static", {}) | grid
-            cycle = solve_static(parse_case(case_text.write(tables)), cache=cache).cycle
+            errors = tuple(_error(tables, wanted, cache) for tables in _meshing(choice, text))
         except FemgearError as error:
             refused.append(f"{_label(choice, '/').partition('_')[2]} has none: {error.message} ({error.code})")
             continue
-        computed.append(ComputedTeeth(choice, text, float(cycle.peak_to_peak("sun_arc"))))
+        computed.append(ComputedTeeth(choice, text, errors))
     progress("transmission error", len(teeth), len(teeth))
     return computed, refused
+
+
+def _meshing(choice: SizedTeeth, text: str) -> Iterator[dict[str, Any]]:
+    """Tables of the cases whose transmission errors count: of a gearbox every pair of a branch, with its torque."""
+    tables = case_text.parse(text, "")
+    if choice.kind not in _DRAFTED:
+        yield tables
+        return
+    for pair, torque in zip(tables["pair"], choice.torques, strict=False):
+        if torque:
+            yield pair["teeth"] | {"operation": {"torque": f"{torque!r} N m"}}
+
+
+def _error(tables: dict[str, Any], wanted: WantedTeeth, cache: Path | None) -> float:
+    """Static transmission error of a case on a coarse grid, peak to peak on the base circle of its first gear [m]."""
+    grid = {"positions": wanted.positions, "flank_elements": wanted.flank_elements, "stresses": False}
+    case = parse_case(case_text.write(tables | {"static": tables.get("static", {}) | grid}))
+    return float(solve_static(case, cache=cache).cycle.peak_to_peak("sun_arc"))
 
 
 def case_of(demand: ToothDemand, choice: SizedTeeth) -> str:
@@ -192,10 +213,12 @@ def case_of(demand: ToothDemand, choice: SizedTeeth) -> str:
         planets=choice.planets if of_set else None,
         face_width=LENGTH.show(math.ceil(1e4 * max(choice.widths)) / 1e4),
     )
-    if not of_set or demand.fixed == "ring":
+    if choice.kind in _DRAFTED:
+        return text.replace('fixed = ["large sun"]', 'fixed = ["carrier"]') if demand.stands == "carrier" else text
+    if not of_set or demand.stands == "ring":
         return text
-    text = text.replace('fixed = "ring"', f'fixed = "{demand.fixed}"')
-    if demand.fixed == "sun":
+    text = text.replace('fixed = "ring"', f'fixed = "{demand.stands}"')
+    if demand.stands == "sun":
         on_ring = demand.torque * choice.teeth[-1] / choice.teeth[0]
         text = text.replace('input = "sun"', 'input = "ring"')
         text = text.replace(f'torque = "{demand.torque:.10g} N m"', f'torque = "{on_ring:.10g} N m"')
@@ -220,7 +243,7 @@ def _header(demand: ToothDemand) -> tuple[str, ...]:
         "diameter [m]",
         "volume [m^3]",
         "size decided by",
-        *(f"contact ratio {number}" for number in range(1, 2 if demand.kind == "pair" else 3)),
+        *(f"contact ratio {number}" for number in range(1, _MESHES.get(demand.kind, 2) + 1)),
         "left of the first harmonic",
         "hunting teeth",
         "warned of",
@@ -269,6 +292,7 @@ _COLUMNS = (
     "first harmonic leaves",
     "hunting",
 )
+_BESIDE_ERRORS = ("teeth", "planets", "ratio", "volume [cm^3]", "first harmonic leaves", "hunting")
 
 
 def _described(demand: ToothDemand, sized: Sequence[SizedTeeth], beyond: int) -> Block:
@@ -283,8 +307,10 @@ def _described(demand: ToothDemand, sized: Sequence[SizedTeeth], beyond: int) ->
         notes.append(
             f"{beyond} more that assemble are further from the ratio and were not sized: raise --most for them"
         )
-    if demand.kind == "stepped":
-        notes.append("stepped planets: gears without shift; the cases have the larger face width for all gears")
+    if demand.kind in _DRAFTED:
+        notes.append("gears without shift; cases have the larger face width for all gears")
+        if demand.stands not in _DRAFTED[demand.kind]:
+            notes.append(f"no cases and no transmission errors: drafts have a standing {_DRAFTED[demand.kind][0]}")
     return Block(f"Smallest {demand.kind} teeth", (*_COLUMNS, "decided by"), rows, tuple(notes))
 
 
@@ -293,11 +319,14 @@ def _described_errors(
 ) -> Block:
     """Transmission errors of the teeth that were computed, and which could not be."""
     rows = tuple(
-        (*_cells(teeth.choice), f"{1e6 * teeth.error:.3f}", "*" if place in front else "")
+        (
+            *(cell for cell, column in zip(_cells(teeth.choice), _COLUMNS, strict=True) if column in _BESIDE_ERRORS),
+            " ".join(f"{1e6 * error:.3f}" for error in teeth.errors),
+            "*" if place in front else "",
+        )
         for place, teeth in enumerate(computed)
     )
-    note = "STE: static transmission error peak to peak of unmodified teeth, as an arc on the base circle of " + (
-        "gear 1" if demand.kind == "pair" else "the sun"
-    )
+    where = {"pair": "gear 1", "planetary": "the sun"}.get(demand.kind, "the first gear, mesh by mesh")
+    note = f"STE: static transmission error peak to peak of unmodified teeth, as an arc on the base circle of {where}"
     notes = (note, "front: none is smaller with less", *refused)
-    return Block("Transmission error", (*_COLUMNS, "STE p-p [µm]", "front"), rows, notes)
+    return Block("Transmission error", (*_BESIDE_ERRORS, "STE p-p [µm]", "front"), rows, notes)

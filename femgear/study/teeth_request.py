@@ -12,13 +12,14 @@ class WantedTeeth:
     Parameters
     ----------
     kind
-        planetary, pair or stepped (planets with two gears, without transmission error).
+        planetary, pair, stepped (planets with two gears), double (pairs of planets) or ravigneaux.
     planets
         A number, or as 3..5 all from one to another; may be repeated.
     tolerance
         Largest relative deviation from the ratio.
     fixed
-        Member of a set that stands: ring, carrier (the ring is driven), or sun (the ring drives).
+        Member of a set that stands: ring, carrier (the ring is driven), or sun (the ring drives). Of a Ravigneaux set
+        the small sun drives, and sun is the large one, the default.
     most
         Teeth to size; of more, those nearest to the ratio.
     best
@@ -32,7 +33,7 @@ class WantedTeeth:
     kind: str = "planetary"
     planets: tuple[str, ...] = ("3",)
     tolerance: float = 0.02
-    fixed: str = "ring"
+    fixed: str | None = None
     most: int = 10_000
     best: int = 12
     positions: int = 24

@@ -14,6 +14,7 @@ from typing import Any
 from femgear.case.estimates import Estimate, cylinder, estimated_mesh_stiffness, usual_rim, usual_torque
 from femgear.case.quantities import FREE, INERTIA, LENGTH, MASS, STIFFNESS, TORSION, to_si
 from femgear.errors import CaseError
+from femgear.gears.paired_planets import angle_between
 from femgear.gears.planet_assembly import assembly_step, double_gears, ravigneaux_gears, stepped_gears
 from femgear.gears.power_flow import pair_condition, power_flow
 from femgear.gears.shaft_graph import StageGears
@@ -31,6 +32,8 @@ planets and ring; sun, first gear of the planets and its ring, second gear and i
 """
 _DENSITY, _MODULUS, _BACKLASH = 7850.0, 206e9, 0.04
 _STEEL = {"youngs_modulus": "206 GPa", "poisson_ratio": 0.3, "density": "7850 kg/m^3"}
+_HARDENED = {"treatment": "case hardened steel", "hardness": 700, "estimated": True}
+"""Usual material of gears, for safeties and lives."""
 _BEARING, _FLANGE = 0.2, 2.0
 """Stiffness of a bearing, and of the flange of a ring, over that of a mesh."""
 _LEVER = 3.0
@@ -238,7 +241,6 @@ class _Tables:
                 "face_width": LENGTH.show(self.width),
                 "backlash": LENGTH.show(round(_BACKLASH * module, 7)),
             },
-            "material": _STEEL,
         }
         for number, gear in enumerate(gears):
             inside = internal and number == 1
@@ -250,6 +252,7 @@ class _Tables:
             self.notes[f"pair[{len(self.pairs)}].teeth.gear_{number + 1}.{key}"] = (
                 "estimated: a usual rim" if inside else "estimated: solid down to its shaft"
             )
+        teeth["material"] = _STEEL | _HARDENED
         teeth["operation"] = {"torque": "1 N m"}
         places = [LENGTH.show(round(place, 9)) for place in positions]
         table = {"name": teeth["title"], "shafts": shafts, "carrier": "carrier", "positions": places, "teeth": teeth}
@@ -320,7 +323,7 @@ def _check_fit(layout: _Layout, planets: int) -> None:
             key="--planets",
             value=planets,
             limit=", ".join(map(str, fit)),
-            remedy="other teeth: femgear.gears.planet_assembly has their places, femgear teeth finds stepped sets",
+            remedy="other teeth: femgear.gears.planet_assembly has their places, femgear teeth --kind finds sets",
         )
 
 
@@ -349,8 +352,8 @@ def _usual_load(layout: _Layout, module: float, width: float, planets: int) -> f
 
 def _beside(first: float, second: float, between: float, key: str) -> float:
     """Angle [rad] at which two planets on these radii are so far apart."""
-    cosine = (first**2 + second**2 - between**2) / (2.0 * first * second)
-    if not -1.0 < cosine < 1.0:
+    angle = angle_between(first, second, between)
+    if angle is None:
         raise CaseError(
             "both planets of a branch do not reach each other",
             code="E-CENTRE-DISTANCE",
@@ -359,7 +362,7 @@ def _beside(first: float, second: float, between: float, key: str) -> float:
             limit=f"axes {abs(first - second):g} to {first + second:g} modules apart, these teeth {between:g}",
             remedy="other teeth of the planets",
         )
-    return math.acos(cosine)
+    return angle
 
 
 def _stepped(sun: int, first: int, second: int, ring: int) -> _Layout:
@@ -405,8 +408,8 @@ def _ravigneaux(small: int, large: int, short: int, long: int, ring: int) -> _La
     meshes = (
         (_Gear("small sun", small, 1), _Gear("short planet", short, 1), 1.0),
         (_Gear("short planet", short, 1), _Gear("long planet", long, 1), 1.0),
-        (_Gear("long planet", long, 1), _Gear("ring", ring, 1), 1.0),
         (_Gear("large sun", large, 0), _Gear("long planet", long, 0), 1.0),
+        (_Gear("long planet", long, 1), _Gear("ring", ring, 1), 1.0),
     )
     places = {"short planet": (near, 0.0), "long planet": (far, beside)}
     gears = ravigneaux_gears(small, large, short, long, ring)

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from planet_gearboxes import SET_KINDS as KINDS
 from planet_gearboxes import free_speeds, pair_conditions, places_by_trial, random_set
+from set_conditions import ravigneaux_conditions
 
 from femgear.errors import GeometryError
 from femgear.gears.planet_assembly import (
@@ -20,7 +21,7 @@ from femgear.gears.planet_assembly import (
     timing_marks,
     tooth_relations,
 )
-from femgear.gears.power_flow import power_flow, ravigneaux_conditions
+from femgear.gears.power_flow import power_flow
 
 
 @pytest.mark.parametrize("kind", KINDS)

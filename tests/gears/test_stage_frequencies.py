@@ -3,6 +3,7 @@
 import math
 
 import pytest
+from set_conditions import ravigneaux_conditions, stepped_condition
 
 from femgear.errors import CaseError
 from femgear.gears.kinematics import planet_motion
@@ -11,8 +12,6 @@ from femgear.gears.power_flow import (
     pair_condition,
     planetary_condition,
     power_flow,
-    ravigneaux_conditions,
-    stepped_condition,
 )
 from femgear.gears.stage_frequencies import stage_frequencies
 

@@ -1,11 +1,18 @@
 """Tests of the search of tooth numbers: what is listed, how sizes go with load, what is refused."""
 
 import math
+import random
+import time
 from dataclasses import replace
 
+import numpy as np
 import pytest
+from planet_gearboxes import places_by_trial
+from set_conditions import ravigneaux_conditions
 
 from femgear.errors import GeometryError
+from femgear.gears.planet_assembly import double_gears, ravigneaux_gears
+from femgear.gears.power_flow import planetary_condition, power_flow
 from femgear.gears.tooth_search import LEAST_TEETH, MOST_TEETH, ToothDemand, candidates, search_teeth, size_of
 
 
@@ -96,6 +103,9 @@ def test_what_the_first_harmonic_leaves_follows_from_the_phases():
         (ToothDemand(5.0), (27, 40, 108), 3),
         (ToothDemand(1.5, kind="pair"), (24, 36), 1),
         (ToothDemand(6.789, tolerance=0.01), (19, 45, 110), 3),
+        pytest.param(ToothDemand(10.5, kind="stepped"), (24, 57, 27, 108), 3, marks=pytest.mark.slow),
+        (ToothDemand(2.5, kind="double"), (24, 18, 20, 84), 3),
+        (ToothDemand(22 / 15, kind="ravigneaux"), (30, 36, 18, 18, 72), 3),
     ],
 )
 def test_the_search_finds_nothing_larger_than_known_teeth_of_the_ratio(demand, shipped, planets):
@@ -106,11 +116,12 @@ def test_the_search_finds_nothing_larger_than_known_teeth_of_the_ratio(demand, s
 @pytest.mark.parametrize(
     ("values", "words"),
     [
-        ({"kind": "double"}, "teeth of a 'double'"),
+        ({"kind": "triple"}, "teeth of a 'triple'"),
         ({"fixed": "planet"}, "no member"),
         ({"ratio": 0.5}, "searched for"),
         ({"planets": (3, 13)}, "searched for"),
         ({"ratio": 60.0}, "no planetary teeth"),
+        ({"kind": "double", "fixed": "sun"}, "slower"),
     ],
 )
 def test_what_nobody_can_ask_for_is_refused(values, words):
@@ -120,4 +131,62 @@ def test_what_nobody_can_ask_for_is_refused(values, words):
 
 def test_planets_without_room_have_no_size():
     with pytest.raises(GeometryError, match="no room"):
+        size_of(ToothDemand(2.5, kind="double"), (24, 27, 27, 84), 6)
+    with pytest.raises(GeometryError, match="no room"):
         size_of(ToothDemand(10.0), (20, 80, 180), 4)
+
+
+CONDITIONS = {
+    "double": lambda z: [planetary_condition("set", "sun", "carrier", "ring", z[0], z[-1], double=True)],
+    "ravigneaux": lambda z: ravigneaux_conditions("set", "sun", "large sun", "carrier", "ring", z[0], z[1], z[-1]),
+}
+"""Willis' equations of sets whose planets are in mesh."""
+
+
+@pytest.mark.parametrize(
+    ("kind", "fixed", "ratio"),
+    [
+        ("double", "ring", 2.4),
+        ("double", "carrier", 3.5),
+        ("ravigneaux", "sun", 1.5),
+        ("ravigneaux", "carrier", 2.4),
+        ("ravigneaux", "ring", 1.3),
+    ],
+)
+def test_planets_in_mesh_turn_by_the_ratio_and_assemble(kind, fixed, ratio):
+    demand = ToothDemand(ratio, kind=kind, fixed=fixed, planets=(3, 4), tolerance=0.01)
+    listed = candidates(demand)
+    assert len(listed) > 50
+    for number, (teeth, planets) in enumerate(random.Random(kind + fixed).sample(listed, 20)):
+        central = ["sun", "ring"] if kind == "double" else ["sun", "large sun", "ring"]
+        stands = "large sun" if fixed == "sun" else fixed
+        output = "carrier" if fixed == "ring" else "ring"
+        flow = power_flow(
+            [*central, "carrier"],
+            CONDITIONS[kind](teeth),
+            speeds={"sun": 1.0},
+            torques={"sun": 1.0},
+            held=[stands],
+            outputs=[output],
+        )
+        speed = 1.0 / abs(flow.speed[output])
+        assert abs(speed / ratio - 1.0) <= 0.01 + 1e-9
+        choice = size_of(demand, teeth, planets)
+        assert choice.ratio == pytest.approx(speed, rel=1e-12)
+        gears = (double_gears if kind == "double" else ravigneaux_gears)(*teeth)
+        if number < 3:  # all teeth tried
+            places = places_by_trial(gears)
+            assert all(np.abs(places - n / planets).min() < 1e-9 for n in range(planets))
+        # the force on the ring is that of its torque
+        on_ring = abs(flow.torque["ring"]) * demand.torque / planets
+        assert choice.torques[-1] * teeth[-1] / teeth[-2] == pytest.approx(on_ring, rel=1e-9)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("kind", "ratio"), [("stepped", 10.5), ("double", 2.5)])
+def test_ten_thousand_candidates_take_less_than_three_minutes(kind, ratio):
+    start = time.perf_counter()
+    demand = ToothDemand(ratio, kind=kind, planets=(3, 4), tolerance=0.05)
+    listed, (sized, beyond) = candidates(demand), search_teeth(demand)
+    assert len(listed) - beyond == 10_000 and len(sized) > 5000
+    assert time.perf_counter() - start < 180.0

@@ -1,6 +1,7 @@
 """femgear teeth: what it writes, that sizes and errors are those of its cases, and what it refuses."""
 
 import csv
+import itertools
 from dataclasses import replace
 
 import numpy as np
@@ -13,6 +14,7 @@ from femgear.stages.static import solve_static
 from femgear.stages.strength import case_stresses
 from femgear.study.teeth import ComputedTeeth, best_of_every_phasing, case_of, front_of
 from femgear.trains.gearbox.power import gearbox_flow
+from femgear.trains.gearbox.results import gearbox_warnings
 from femgear.trains.reading import parse_case, read_case, with_values
 
 QUICK = ("--tolerance", "0.004", "--best", "1", "--positions", "8", "--flank-elements", "6")
@@ -39,15 +41,52 @@ def test_the_best_are_listed_solved_and_drawn(tmp_path):
     assert f"{1e6 * float(error):.3f}" in done.stdout
 
 
-def test_stepped_sets_have_sizes_and_cases(tmp_path):
-    arguments = ("--ratio", "9", "--kind", "stepped", "--tolerance", "0.0005", "--best", "1", "-o", "out")
+@pytest.mark.parametrize(
+    ("kind", "ratio", "tolerance", "output"),
+    [
+        ("stepped", 9.0, "0.0005", "carrier"),
+        pytest.param("double", 2.5, "0.001", "carrier", marks=pytest.mark.slow),
+        pytest.param("ravigneaux", 22 / 15, "0.001", "ring", marks=pytest.mark.slow),
+    ],
+)
+def test_sets_of_any_planets_have_sizes_errors_and_cases(kind, ratio, tolerance, output, tmp_path):
+    quick = ("--best", "1", "--positions", "8", "--flank-elements", "6")
+    arguments = ("--ratio", f"{ratio!r}", "--kind", kind, "--tolerance", tolerance, *quick, "-o", "out")
     done = run_femgear("teeth", *arguments, folder=tmp_path)
     assert done.returncode == 0, done.stderr
-    assert "larger face width" in done.stdout
-    assert len(rows(tmp_path / "out" / "teeth.csv")) > 20
-    (case,) = (tmp_path / "out").glob("stepped_*.toml")
-    flow = gearbox_flow(read_case(case))
-    assert flow.speed["sun"] / flow.speed["carrier"] == pytest.approx(9.0, rel=5e-4)
+    assert "larger face width" in done.stdout and "mesh by mesh" in " ".join(done.stdout.split())
+    assert len(rows(tmp_path / "out" / "teeth.csv")) > 5
+    (case,) = (tmp_path / "out").glob(f"{kind}_*.toml")
+    read = read_case(case)
+    flow = gearbox_flow(read)
+    driven = read.operation.load_case[0].speed
+    assert [*driven] == ["small sun" if kind == "ravigneaux" else "sun"]
+    assert abs(flow.speed[next(iter(driven))] / flow.speed[output]) == pytest.approx(ratio, rel=float(tolerance))
+    assert not [finding for finding in gearbox_warnings(read) if finding.code != "W-MATERIAL"]
+
+
+@pytest.mark.parametrize(
+    ("demand", "teeth"),
+    [
+        (ToothDemand(10.5, kind="stepped"), (24, 57, 27, 108)),
+        (ToothDemand(2.5, kind="double"), (24, 18, 20, 84)),
+        (ToothDemand(22 / 15, kind="ravigneaux"), (30, 36, 18, 18, 72)),
+        (ToothDemand(2.4, kind="ravigneaux", fixed="carrier"), (30, 36, 18, 18, 72)),
+    ],
+)
+def test_torques_of_a_size_are_those_of_the_power_flow_of_its_case(demand, teeth):
+    choice = size_of(demand, teeth, 3)
+    case = parse_case(case_of(demand, choice))
+    flow = gearbox_flow(case)
+    torques = [abs(flow.first_torque(stage)) for stage in case.pair[: len(choice.torques)]]
+    assert torques == pytest.approx(choice.torques, rel=1e-9, abs=1e-9)
+
+
+def test_a_member_that_no_draft_holds_gives_sizes_alone(tmp_path):
+    arguments = ("--ratio", "8", "--kind", "stepped", "--fixed", "carrier", "--tolerance", "0.0005", "-o", "out")
+    done = run_femgear("teeth", *arguments, folder=tmp_path)
+    assert done.returncode == 0, done.stderr
+    assert "no cases" in done.stdout and [path.name for path in (tmp_path / "out").glob("*.toml")] == []
 
 
 @pytest.mark.parametrize(
@@ -98,7 +137,9 @@ def test_the_smallest_of_every_phasing_are_chosen_first():
 def test_none_is_smaller_with_less_error_than_the_front():
     draw = np.random.default_rng(4)
     choice = size_of(SET, (27, 40, 108), 3)
-    sets = [ComputedTeeth(replace(choice, volume=v), "", e) for v, e in draw.uniform(1.0, 2.0, (40, 2)).tolist()]
+    sets = [
+        ComputedTeeth(replace(choice, volume=v), "", (0.5 * e, e)) for v, e in draw.uniform(1.0, 2.0, (40, 2)).tolist()
+    ]
     front = front_of(sets)
     for place, teeth in enumerate(sets):
         beaten = any(o.choice.volume <= teeth.choice.volume and o.error < teeth.error for o in sets if o is not teeth)
@@ -121,4 +162,8 @@ def test_the_picture_names_the_front_alone():
     )
     (ax,) = figure.axes
     assert [text.get_text() for text in ax.texts] == ["a", "b"]
+    near = size_and_error([1.0, 1.05, 2.0], [2.0, 1.99, 1.9], ["a", "b", "c"], left=[""] * 3, front=[0, 1, 2])
+    near.canvas.draw()
+    boxes = [text.get_window_extent() for text in near.axes[0].texts]
+    assert not any(one.overlaps(other) for one, other in itertools.combinations(boxes, 2))
     assert ax.get_legend_handles_labels()[1] == ["leaves torque", "leaves nothing", "pairs"]

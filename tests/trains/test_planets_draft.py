@@ -10,6 +10,7 @@ from femgear.trains.drafts import ToothForm, new_case
 from femgear.trains.gearbox.deflection import solve_deflection
 from femgear.trains.gearbox.planet_shafts import pair_phases
 from femgear.trains.gearbox.power import gearbox_flow
+from femgear.trains.gearbox.results import gearbox_warnings
 from femgear.trains.gearbox.solid_bodies import gearbox_bodies
 from femgear.trains.planets_draft import PLANET_KINDS
 from femgear.trains.reading import parse_case, with_values
@@ -106,3 +107,11 @@ def test_in_the_picture_every_tooth_stands_in_a_gap_of_its_mate(kind):
         assert {gear.angle for gear in gears if gear.member == "long planet 1"} == {
             next(gear.angle for gear in gears if gear.member == "long planet 1")
         }
+
+
+@pytest.mark.parametrize("kind", PLANET_KINDS)
+def test_gears_of_a_draft_have_a_usual_treatment_that_is_told_once(kind):
+    case = parse_case(new_case(kind))
+    assert {stage.teeth["material"]["treatment"] for stage in case.pair} == {"case hardened steel"}
+    (finding,) = [finding for finding in gearbox_warnings(case) if finding.code == "W-MATERIAL"]
+    assert f"({len(case.pair)} stages)" in finding.text

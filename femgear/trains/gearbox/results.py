@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
@@ -602,9 +603,23 @@ def gearbox_warnings(case: GearboxCase) -> Iterator[Finding]:
             if given:
                 text = f"{', '.join(given)} of these teeth have no effect: shafts and bearings of the gearbox hold them"
                 yield Finding("W-UNUSED", f"{kind}[{i}].teeth", text)
-            if (teeth := teeth_of(stage)) is not None:
-                for finding in (*estimated_materials(teeth), *thin_rims(teeth), *left_out_of_faults(teeth)):
-                    yield replace(finding, key=f"{kind}[{i}].teeth.{finding.key}")
+    yield from _of_teeth(case)
+
+
+def _of_teeth(case: GearboxCase) -> Iterator[Finding]:
+    """What the teeth of stages are warned of; what several have alike is told once, of the first one."""
+    first, count = dict[tuple[str, str, str], Finding](), Counter[tuple[str, str, str]]()
+    for kind in ("pair", "planetary"):
+        for i, stage in enumerate(getattr(case, kind)):
+            if (teeth := teeth_of(stage)) is None:
+                continue
+            for finding in (*estimated_materials(teeth), *thin_rims(teeth), *left_out_of_faults(teeth)):
+                alike = finding.code, finding.key, finding.text
+                first.setdefault(alike, replace(finding, key=f"{kind}[{i}].teeth.{finding.key}"))
+                count[alike] += 1
+    for alike, finding in first.items():
+        of_all = f"{finding.text} ({count[alike]} stages)"
+        yield replace(finding, text=of_all) if count[alike] > 1 else finding
 
 
 def _given_planets(case: GearboxCase) -> Iterator[Finding]:
