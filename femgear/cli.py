@@ -1109,12 +1109,13 @@ def gearbox(
 ) -> int:
     """Write a planetary set or a pair as a gearbox of one stage; say what a gearbox has no place for.
 
-    Its members are bodies on springs. Shafts, rolling bearings, a casing and more stages can be added to the file.
+    Its members are bodies on springs. Shafts, rolling bearings, a casing and more stages can be added to the file. A
+    file of a former model (multistage, drivetrain) is written with the entries of today.
 
     Parameters
     ----------
     case
-        TOML case file of a set, with or without the sections planar and helical, or of a pair.
+        TOML case file of a set, with or without the sections planar and helical, of a pair, or of a former model.
     output
         Case file to write. Default: NAME_gearbox.toml.
     force

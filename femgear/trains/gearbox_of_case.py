@@ -58,18 +58,20 @@ class WrittenAsGearbox:
 
 
 def gearbox_of_case(case: Any) -> WrittenAsGearbox:
-    """Write a planetary set or a pair as a gearbox of one stage.
+    """Write a planetary set or a pair as a gearbox of one stage, a file of a former model as the gearbox it is read as.
 
     Parameters
     ----------
     case : Case
-        Of an elastic, planar or helical set, or of a pair, from `femgear.read_case`.
+        Of an elastic, planar or helical set, of a pair, or of a former model, from `femgear.read_case`.
 
     Raises
     ------
     CaseError
         A case of another train (E-CHOICE).
     """
+    if case.train == "gearbox" and any(finding.code == "W-FORMER" for finding in case.notices):
+        return WrittenAsGearbox(case_text.parse(case.source, ""), ())
     if case.train not in ("elastic", "planar", "helical", "pair"):
         raise CaseError(
             "only a planetary set or a pair of gears is one stage of a gearbox",

@@ -74,6 +74,14 @@ def test_meshes_of_a_given_stiffness_keep_their_play_and_what_has_no_place_is_to
     assert {"planar.damping_ratios", "planar.back_flanks"} <= keys and "planar.line_backlash" not in keys
 
 
+def test_a_file_of_a_former_model_is_written_as_the_gearbox_that_it_is_read_as(tmp_path):
+    file, path = "cases/wind_turbine_drivetrain.toml", str(tmp_path / "box.toml")
+    assert cli.main(["gearbox", file, "-o", path]) == 0
+    box, former = read_case(path), read_case(file)
+    assert ["W-FORMER" in {notice.code for notice in case.notices} for case in (former, box)] == [True, False]
+    assert [shaft.name for shaft in box.shaft] == [shaft.name for shaft in former.shaft]
+
+
 def test_what_is_no_set_is_refused():
     with pytest.raises(CaseError) as refused:
         gearbox_of_case(read_case("cases/gear_pair.toml"))

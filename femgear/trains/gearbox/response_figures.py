@@ -42,10 +42,14 @@ def _stage_style(number: int) -> dict[str, str]:
 
 
 def _log_axis(ax, level: np.ndarray, parts: np.ndarray) -> None:
-    """Let the ordinate be logarithmic, over what is drawn, but no more than `_DECADES` decades."""
-    largest = float(level.max(initial=0.0))
-    if largest > 0.0:
-        drawn = np.concatenate([level, parts.ravel()])
+    """Let the ordinate be logarithmic, over what is drawn, but no more than `_DECADES` decades.
+
+    Below one decade, which may have one tick alone, it begins at zero.
+    """
+    largest, drawn = float(level.max(initial=0.0)), np.concatenate([level, parts.ravel()])
+    if largest > 0.0 and drawn.min() > 0.1 * largest:
+        ax.set_ylim(0.0, 1.1 * largest)
+    elif largest > 0.0:
         ax.set_yscale("log")
         ax.set_ylim(max(0.7 * drawn[drawn > 0.0].min(), 10.0**-_DECADES * largest), 1.5 * largest)
 
