@@ -37,7 +37,7 @@ from femgear.trains.gearbox.nonlinear import NonlinearGearbox, nonlinear_gearbox
 from femgear.trains.gearbox.play import loose_notes
 from femgear.trains.gearbox.power import gearbox_flow
 from femgear.trains.gearbox.sensors import sensor_rows
-from femgear.trains.gearbox.silence import exciting_sections
+from femgear.trains.gearbox.silence import exciting_sections, weighed_sections
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -110,6 +110,8 @@ class StageBalance:
 def solve_balance(found: Deflection, *, steps: Steps | None = None, progress: Progress = silent) -> list[StageBalance]:
     """Solve for the periodic motion with flanks that part, of all stages that excite the gearbox, one after the other.
 
+    Without any of those that weight lets rattle, at constant stiffness.
+
     CaseError: planets that are not equally spaced on a carrier that turns (E-TURNING). ConvergenceError: an undamped
     resonance (E-RESONANCE).
 
@@ -123,11 +125,15 @@ def solve_balance(found: Deflection, *, steps: Steps | None = None, progress: Pr
         Called with ("balance", done, total).
     """
     wanted, solved = found.model.case.balance, list[StageBalance]()
-    stages = exciting_stages(found)
+    weighed = [stage.name for stage in weighed_sections(found.model.case)]
+    stages = [stage for stage in found.model.stages if stage.name in weighed] or exciting_stages(found)
     for number, stage in enumerate(stages):
         progress("balance", number, len(stages))
         rubs = isinstance(stage.section, PairSection)
-        drive = excitation_of(found, stage, steps=steps, friction=rubs)
+        if weighed:
+            drive = constant_excitation(found, stage)
+        else:
+            drive = excitation_of(found, stage, steps=steps, friction=rubs)
         if drive.source is not None:
             # friction acts about its mean, which the torques of the gearbox do not know
             mean = found.contacts[stage.name].normal_force[:, None]
@@ -223,7 +229,7 @@ def check_balance(case: GearboxCase) -> None:
     CaseError: one for every such stage that excites the gearbox (E-TURNING).
     """
     flow, problems = gearbox_flow(case), list[CaseError]()
-    exciting = exciting_sections(case) if case.balance.harmonics else ()
+    exciting = (weighed_sections(case) or exciting_sections(case)) if case.balance.harmonics else ()
     for stage in case.planetary if exciting and case.balance.together else exciting:
         if isinstance(stage, PairSection) or not flow.carries(stage):
             continue

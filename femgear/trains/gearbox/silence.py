@@ -1,7 +1,7 @@
 """Why a gearbox has no response, and which entries have no effect then.
 
 Stages whose teeth are computed, or that have contact ratios, excite a gearbox, and only while it turns. Sensors are
-left with the modes.
+left with the modes. Where teeth part weight excites too: it turns against the planets of a carrier.
 """
 
 from __future__ import annotations
@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from femgear.findings import Finding
-from femgear.trains.gearbox.case_file import BoxPlanetarySection, GearboxCase, PairSection
+from femgear.trains.gearbox.case_file import CASING, BoxPlanetarySection, GearboxCase, PairSection
 from femgear.trains.gearbox.power import gearbox_flow
 
 
@@ -43,16 +43,40 @@ def why_silent(case: GearboxCase) -> str:
     return _silence(case)[0]
 
 
+def weighed_sections(case: GearboxCase) -> list[BoxPlanetarySection]:
+    """List the planetary stages of a given stiffness on a carrier that turns, which weight lets rattle.
+
+    Only where no stage excites: beside one they move with it.
+    """
+    if case.gravity is None or exciting_sections(case):
+        return []
+    flow = gearbox_flow(case)
+    return [
+        stage
+        for stage in case.planetary
+        if None not in (stage.sun_mesh, stage.ring_mesh)
+        and stage.carrier != CASING
+        and flow.carries(stage)
+        and flow.speed[stage.carrier]
+    ]
+
+
+def why_no_balance(case: GearboxCase) -> str:
+    """Tell why no teeth of a case are looked at that might part, empty where they are."""
+    return "" if weighed_sections(case) else why_silent(case)
+
+
 def idle_entries(case: GearboxCase) -> Iterator[Finding]:
     """Tell sensors, a run-up and a balance of a gearbox that has no response (W-UNUSED)."""
     if not (case.sensor or case.runup.count or case.balance.harmonics):
         return
     why, remedy = _silence(case)
-    if why and case.sensor:
+    weighed = case.balance.harmonics and weighed_sections(case)
+    if why and case.sensor and not weighed:
         text = f"the gearbox has no response that sensors could feel, modes at them are all: {why}"
         yield Finding("W-UNUSED", "sensor", text, remedy=remedy)
     if why and case.runup.count:
         text = f"the run-up has no effect, since the gearbox has no response: {why}"
         yield Finding("W-UNUSED", "runup", text, remedy=remedy)
-    if why and case.balance.harmonics:
+    if why and case.balance.harmonics and not weighed:
         yield Finding("W-UNUSED", "balance", f"no teeth are looked at that might part: {why}", remedy=remedy)

@@ -56,7 +56,7 @@ from femgear.trains.gearbox.results import (
 from femgear.trains.gearbox.run_up_speeds import gearbox_resonances, run_up_speeds
 from femgear.trains.gearbox.sensors import check_sensors, describe_modes_at_sensors, gearbox_sensors
 from femgear.trains.gearbox.signals import GEARBOX_RECORDED
-from femgear.trains.gearbox.silence import why_silent
+from femgear.trains.gearbox.silence import why_no_balance, why_silent
 from femgear.trains.gearbox.solid_bodies import gearbox_bodies
 from femgear.trains.gearbox.spectrum import (
     sign_of_forces,
@@ -158,7 +158,7 @@ def solve_box_balance(
 
 
 def _no_balance(case: GearboxCase) -> str:
-    return why_silent(case) or ("" if case.balance.harmonics else "[balance] gives no harmonics")
+    return why_no_balance(case) or ("" if case.balance.harmonics else "[balance] gives no harmonics")
 
 
 def _no_spectrum(case: GearboxCase) -> str:

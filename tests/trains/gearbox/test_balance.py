@@ -9,6 +9,7 @@ from casings import casing_tables
 from small_gearbox import loose_pair_tables, pair_tables, planetary_tables
 
 from femgear.errors import CaseError
+from femgear.run import solve
 from femgear.solvers.periodic.harmonic_balance import displacements, solve_harmonic_balance
 from femgear.solvers.time.transient import solve_transient
 from femgear.system.system import MeshExcitation
@@ -29,9 +30,10 @@ from femgear.trains.gearbox.deflection import Deflection, solve_deflection
 from femgear.trains.gearbox.excitation import excitation_of
 from femgear.trains.gearbox.nonlinear import nonlinear_gearbox
 from femgear.trains.gearbox.results import DeflectionResult
-from femgear.trains.gearbox.silence import idle_entries
+from femgear.trains.gearbox.silence import idle_entries, why_no_balance, why_silent
 from femgear.trains.gearbox.stages import solve_box_balance, solve_deflections
-from femgear.trains.reading import read_case
+from femgear.trains.gearbox_of_case import gearbox_of_case
+from femgear.trains.reading import read_case, with_value
 
 
 def heavy_set(torque: str, **balance) -> Deflection:
@@ -212,3 +214,21 @@ def test_a_bearing_that_loses_its_load_is_met_in_time():
     assert data["bearing"].values.tolist() == ["C"] and data["bearing_lowest"].item() == 0.0
     assert data["bearing_loose"].item() == pytest.approx((loose == 0.0).mean())
     assert any("bearing C carries 0 N to" in note for note in describe_balance(data).notes)
+
+
+def test_weight_alone_moves_planets_of_a_given_stiffness_as_in_the_planar_set():
+    case = with_value(read_case("cases/nrel_pgb.toml"), "planar.response.carrier_harmonics", 2)
+    response = solve(case, only="response")["response"].dataset()
+    weight = np.hypot(response["mesh_force_real"], response["mesh_force_imag"]).values[0, :, 1]
+    # the damping of a gearbox acts on motions of the set with its carrier too, that of the planar set does not
+    entries = {"balance": {"harmonics": 1, "side_bands": 2}, "modes": {"damping_ratio": 0.0}}
+    box = read_case(gearbox_of_case(case).tables | entries)
+    assert not why_no_balance(box) and why_silent(box)
+    data = solve(box, only="balance")["balance"].dataset()
+    largest = (data["largest_force"] - data["mean_force"]).values
+    # at the angles of the carrier that are looked at
+    assert largest == pytest.approx(weight, rel=2e-3)
+    assert data["mean_force"].values == pytest.approx(response["mesh_force_real"].values[0, :, 0], rel=1e-5)
+    still = gearbox_of_case(case).tables
+    del still["gravity"]
+    assert why_no_balance(read_case(still | {"balance": {"harmonics": 1}}))
