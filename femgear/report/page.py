@@ -51,6 +51,9 @@ _CHARTS = "charts.json"
 """File of what the charts of the page show."""
 _DATA = {_CHARTS: "charts", SOLID: "solid", SPACE: "space", EXPLORER: "runup"}
 """Files of a run that the scripts of its page draw, and their names there."""
+_BODIES = {"gear": "gears", "shaft": "shafts", "bearing": "bearings"}
+_BODIES |= {"sensor": "sensors (red)", "foot": "feet (black)"}
+"""Words of the kinds of `femgear.report.space.SpaceBody`."""
 _PARTS = {
     "solid": ("three.min.js", "view.js", "solid.js"),
     "space": ("three.min.js", "view.js", "space.js"),
@@ -164,7 +167,6 @@ def page(train: Train, results: Results, *, static: bool = False) -> str:
     head = "".join(
         (
             f"<h1>{escape(case.title)}</h1>\n",
-            f'<p class="lead">{escape(_lead(results))}</p>\n',
             _contents(sections, numbers, pictures),
             _front(train, results, charts, _caption(gears, data)),
             notice,
@@ -229,13 +231,6 @@ def _policy(scripts: str) -> str:
     )
 
 
-def _lead(results: Results) -> str:
-    """Tell version, stages, and whether the run came to its end."""
-    stages = ", ".join(results.stages) or "nothing"
-    state = "" if results.manifest.complete else "; the run did not come to its end"
-    return f"femgear {results.manifest.versions.get('femgear', '')}: {stages}{state}"
-
-
 def _contents(sections, numbers, pictures) -> str:
     """Link to the sections that there are."""
     shown = [name for name in sections if name in numbers or any(p.section == name for p in pictures)]
@@ -249,12 +244,13 @@ def _anchor(name: str) -> str:
 
 
 def _front(train: Train, results: Results, charts, caption: str | None) -> str:
-    """Make page one: a sentence, a card for every question, the gears in space and two charts.
+    """Make page one: what the train does, a sentence, a card for every question, the gears in space and two charts.
 
     The gears are drawn in space where there is a caption of them.
     """
     sentence, judgements = train.summary(results)
-    text = f'<p class="sentence">{escape(sentence)}</p>\n' if sentence else ""
+    texts = {"duty": train.duty(results.case), "sentence": sentence}
+    text = "".join(f'<p class="{kind}">{escape(words)}</p>\n' for kind, words in texts.items() if words)
     cards = "".join(map(_card, judgements))
     shown = "".join(front_chart(*place) for place in _front_places(train, charts))
     solid = "" if caption is None else part_of("solid").format(escape(caption))
@@ -262,7 +258,9 @@ def _front(train: Train, results: Results, charts, caption: str | None) -> str:
     both = " both" * bool(solid and shown)
     below = f'<div class="top{both}">\n{solid}{charts_beside}</div>\n' if solid or shown else ""
     columns = 3 if len(judgements) == 6 else min(len(judgements), 5)
-    listed_cards = f'<ul class="cards" style="--columns: {columns}">\n{cards}</ul>\n' if cards else ""
+    on_paper = 2 if len(judgements) < 5 else 3
+    style = f"--columns: {columns}; --paper-columns: {on_paper}"
+    listed_cards = f'<ul class="cards" style="{style}">\n{cards}</ul>\n' if cards else ""
     many = " many" * (columns < len(judgements))
     return f'<section class="front{many}" aria-label="Page one">\n{text}{listed_cards}{below}</section>\n'
 
@@ -271,9 +269,11 @@ def _caption(gears: Sequence[Block], data) -> str | None:
     """Say what is seen of the gears in space; None where nothing was drawn."""
     if "solid" in data:
         return "; ".join(gears[0].notes[:2]) + ". Blue: paths of contact, on the lines of action."
-    return (
-        "Gears, shafts, bearings, sensors (red) and feet (black). The pointer names them." if "space" in data else None
-    )
+    if "space" not in data:
+        return None
+    kinds = {body["kind"] for body in data["space"]["bodies"]}
+    words = [words for kind, words in _BODIES.items() if kind in kinds]
+    return " and ".join(", ".join(words).rsplit(", ", 1)).capitalize() + ". The pointer names them."
 
 
 def _front_places(train: Train, charts) -> list[tuple[str, int]]:

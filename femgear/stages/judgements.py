@@ -32,7 +32,7 @@ STRONG, LIFE, HEAT, SMOOTH, QUIET, SURE = (
 )
 """The questions, in the order of the cards."""
 
-_BEYOND = {"W-PRESSURE", "W-STRENGTH"}
+_BEYOND = "W-PRESSURE", "W-STRENGTH"
 """Codes of the findings that no steel carries the load."""
 
 
@@ -90,15 +90,15 @@ def joined_sentence(judgements: Iterable[Judgement]) -> str:
     return "".join(f"{text[0].upper()}{text[1:]}. " for text in sentences).rstrip()
 
 
-def describe_judgements(judgements: Sequence[Judgement]) -> tuple[Block, ...]:
-    """Tabulate judgements for the terminal under the sentence of page one; nothing without any."""
+def describe_judgements(sentence: str, judgements: Sequence[Judgement]) -> tuple[Block, ...]:
+    """Tabulate judgements for the terminal under a sentence; nothing without any."""
     if not judgements:
         return ()
     rows = tuple(
         (judgement.question, judgement.words, ": ".join(filter(None, (judgement.answer, judgement.limit))))
         for judgement in judgements
     )
-    return (Block(joined_sentence(judgements) or "Summary", rows=rows),)
+    return (Block(sentence or "Summary", rows=rows),)
 
 
 def least_of(rating: Rating) -> tuple[Least | None, Least | None]:
@@ -161,10 +161,21 @@ def _and(names: Sequence[str]) -> str:
     return " and ".join(merged_names(names).rsplit(", ", 1))
 
 
-def _doubtful(findings: Iterable[Finding], codes: Sequence[str]) -> str:
-    """Say which doubts and faults with some codes were raised, with their meanings; empty of none."""
+def _raised(findings: Iterable[Finding], codes: Sequence[str]) -> list[str]:
+    """List those of some codes that doubts and faults were raised with."""
     raised = {finding.code for finding in findings if finding.severity != NOTE}
-    return "; ".join(f"{code}: {CATALOGUE[code][1].rstrip('.')}" for code in dict.fromkeys(codes) if code in raised)
+    return [code for code in dict.fromkeys(codes) if code in raised]
+
+
+def _meaning(code: str) -> str:
+    """Write a code with what it means."""
+    return f"{code}: {CATALOGUE[code][1].rstrip('.')}"
+
+
+def _doubts(findings: Iterable[Finding], codes: Sequence[str]) -> str:
+    """Name the doubts and faults with some codes; empty of none."""
+    raised = _raised(findings, codes)
+    return f"doubt{'s' * (len(raised) > 1)}: {', '.join(raised)}" if raised else ""
 
 
 def stresses_text(root: np.ndarray, pressure: np.ndarray) -> str:
@@ -205,8 +216,7 @@ def judge_strength(
         Gears or stages that carry and have no safety.
     """
     findings = list(findings)
-    raised = {finding.code for finding in findings if finding.severity != NOTE}
-    beyond = sorted(raised & _BEYOND)
+    beyond = _raised(findings, _BEYOND)
     rated = [
         (symbol, least, required)
         for symbol, least, required in (
@@ -217,7 +227,8 @@ def judge_strength(
     ]
     if beyond:
         answer = ", ".join(f"{symbol} {least.value:.2f} ({least.where})" for symbol, least, _ in rated) or stresses
-        return Judgement(STRONG, "bad", answer, _doubtful(findings, beyond), f"Not strong enough ({', '.join(beyond)})")
+        meanings = "; ".join(map(_meaning, beyond))
+        return Judgement(STRONG, "bad", answer, meanings, f"Not strong enough ({', '.join(beyond)})")
     if not rated:
         return Judgement(STRONG, "open", stresses or "not rated", remedy, "Its strength is not rated")
     low = [(symbol, least, required) for symbol, least, required in rated if not least.value >= required]
@@ -227,7 +238,7 @@ def judge_strength(
     )
     whole = [] if len(rated) == 2 else ["S_H" if rated[0][0] == "S_F" else "S_F"]
     missing = _not_rated([*whole, *(part for part in unrated if not part.startswith(tuple(whole)))])
-    reasons = _doubtful(findings, doubts)
+    reasons = _doubts(findings, doubts)
     limit = "; ".join(filter(None, (limit, open_factors, missing, reasons)))
     if low:
         failing = " and ".join(f"{symbol} {least.value:.2f} of the {least.where}" for symbol, least, _ in low)
@@ -263,13 +274,14 @@ def judge_lives(
     _, shortest, where = min(lives, key=lambda life: life[1])
     words = f"{where} fails first"
     if math.isinf(shortest):
-        sentence = "No tooth and no bearing fails under these loads"
+        kinds = {name: "tooth" if name == "teeth" else "bearing" for name, *_ in lives}
+        sentence = f"{' and '.join(f'no {kind}' for kind in dict.fromkeys(kinds.values()))} fails under these loads"
     else:
         wanted = f" of the {required:,.0f} h asked for" if required is not None else ""
         sentence = f"It lives {_hours(shortest)}{wanted} ({words})"
     missing = f"the life of {_and(unrated)} is not known" if unrated else ""
     sentence += f"; {missing}" if missing else ""
-    reasons = _doubtful(findings, OF_ROOTS)
+    reasons = _doubts(findings, OF_ROOTS)
     limit = "operation.required_hours gives a limit" if required is None else f"at least {required:,.0f} h"
     state: State = "look" if missing or reasons else "good"
     if required is None or shortest < required:
@@ -369,6 +381,8 @@ def judge_smoothness(answer: str, results: Any, stages: Sequence[str]) -> Judgem
         judged = any("stable" in results[stage] for stage in present)
         words = "teeth stay in contact, motions are stable" if judged else "teeth stay in contact"
         return Judgement(SMOOTH, "good", answer, words)
+    if answer == "-":
+        return Judgement(SMOOTH, "look", ", ".join(against), "", f"At some speeds {' and '.join(against)}")
     return Judgement(SMOOTH, "look", answer, ", ".join(against), f"At some speeds {' and '.join(against)}")
 
 
@@ -459,6 +473,7 @@ def judge_numbers(findings: Sequence[Finding], complete: bool) -> Judgement:
         return Judgement(SURE, "bad", "the run did not come to its end", "", "The run did not come to its end")
     if doubts:
         codes = list(dict.fromkeys(finding.code for finding in doubts if finding.code))
-        shown = ", ".join(codes[:4]) + (f" and {len(codes) - 4} more" if len(codes) > 4 else "")
+        shown = ", ".join([*map(_meaning, codes[:1]), *codes[1:4]])
+        shown += f" and {len(codes) - 4} more" if len(codes) > 4 else ""
         return Judgement(SURE, "look", f"{len(doubts)} doubt{'s' * (len(doubts) > 1)}", shown)
     return Judgement(SURE, "good", "no doubt was raised", "solutions converged, samples resolve them")

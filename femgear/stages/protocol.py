@@ -344,6 +344,8 @@ class Train:
         ``(case) -> figures`` by which cases are compared, none of trains whose studies have quantities of their own.
     judgements : callable
         ``(Results) -> judgements``: the questions that page one answers, in their order.
+    duty : callable
+        ``(case) -> sentence`` that says what the train does, empty of trains without a power flow.
     bodies : callable, optional
         ``(case) -> bodies`` of it in space, as `femgear.report.space.SpaceBody`; None of trains whose gears have no
         teeth.
@@ -373,6 +375,7 @@ class Train:
     verdict: Callable[[Results], Iterable[Block]] = lambda results: ()
     key_figures: Callable[[Any], tuple[KeyFigure, ...]] = lambda case: ()
     judgements: Callable[[Results], Iterable[Judgement]] = lambda results: ()
+    duty: Callable[[Any], str] = lambda case: ""
     bodies: Callable[[Any], Iterable[SpaceBody]] | None = None
     draft_casing: Callable[[Any], tuple[str, tuple[Finding, ...]]] | None = None
     dynamic_model: Callable[[Any, Mapping[str, Any]], DynamicModel] | None = None
@@ -407,14 +410,18 @@ class Train:
 
         Trains without judgements have all their tables.
         """
-        judgements = tuple(self.judgements(results))
+        sentence, judgements = self.summary(results)
         if not judgements:
             return self.describe_results(results)
         stage = None if only is None else self.stage(only)
         numbers = () if stage is None or stage.name not in results.stages else (stage.describe(results),)
         verdict = next(iter(self.verdict(results)), None)
         decided = () if verdict is None else (verdict,)
-        return (*describe_judgements(judgements), *(numbers or decided), *listed(results.findings))
+        return (
+            *describe_judgements(f"{self.duty(results.case)} {sentence}".strip(), judgements),
+            *(numbers or decided),
+            *listed(results.findings),
+        )
 
     def describe_stages(self, results: Results) -> dict[str, Block]:
         """Tabulate the numbers of the stages of a run, by the titles of the stages."""

@@ -140,7 +140,7 @@ def _contact_reason(data: xr.Dataset, kind: str, mesh: int, ratio: float) -> Str
     worst, load = data.isel(mesh=mesh), float(data["contact_worst_load"].values[mesh])
     share, curvature = load / float(data.attrs["nominal_load"]), float(worst["contact_worst_curvature"])
     excess, of_hertz = float(over_hertz(data)[mesh]), float(_nominal_over_hertz(data)[mesh])
-    helical = data.attrs.get("iso_contact_helix_factor", 1.0) > 1.0
+    helical = float(data.attrs.get("iso_contact_helix_factor", 1.0)) > 1.0
     factors = (
         f"x {math.sqrt(curvature):.2f} by the relative curvature where the pressure is largest, {curvature:.2f} times "
         f"that of the pitch point; x {math.sqrt(share):.2f} by the load of the tooth pair, {share:.2f} of the nominal "

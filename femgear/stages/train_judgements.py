@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from typing import Any
 
 import numpy as np
 
 from femgear.case.load_spectrum import required_life
-from femgear.report.tables import significant
 from femgear.stages.judgements import (
     Judgement,
     Least,
@@ -103,17 +102,20 @@ def _stresses(results: Any) -> str:
 
 def _motion(results: Any, dynamic: np.ndarray | None) -> str:
     """Write transmission errors and dynamic factors of a run by kind of mesh."""
-    parts = []
+    parts, kinds = [], []
     errors = _transmission_error(results)
     if errors is not None:
         names, error = errors
-        of_kinds = 1e6 * error.reshape(len(kind_names([str(name) for name in names])), -1).max(axis=1)
-        parts.append(f"transmission error {_joined(of_kinds, 2)} µm")
+        kinds = kind_names([str(name) for name in names])
+        of_kinds = 1e6 * error.reshape(len(kinds), -1).max(axis=1)
+        parts.append(f"transmission error {_joined(of_kinds, '.3g')} µm")
     if dynamic is None and "dynamics" in results.stages:
-        dynamic = computed_dynamic_factor(results.dynamics, len(kind_names(results.dynamics["mesh"].values)))
+        kinds = kind_names(results.dynamics["mesh"].values)
+        dynamic = computed_dynamic_factor(results.dynamics, len(kinds))
     if dynamic is not None:
-        parts.append(f"K_v {_joined(dynamic, 2)}")
-    return ", ".join(parts) or "-"
+        parts.append(f"K_v {_joined(dynamic, '.2f')}")
+    text = ", ".join(parts) or "-"
+    return f"{text} ({', '.join(kinds)})" if " and " in text and kinds else text
 
 
 def _transmission_error(results: Any) -> tuple[np.ndarray, np.ndarray] | None:
@@ -128,7 +130,7 @@ def _transmission_error(results: Any) -> tuple[np.ndarray, np.ndarray] | None:
     return results.static["mesh"].values, peak_to_peak(results.static, "ste")
 
 
-def _joined(values: Sequence[float] | np.ndarray, places: int) -> str:
+def _joined(values: Iterable[float], form: str) -> str:
     """Write the values of the kinds of mesh, one where all are equal."""
-    texts = [significant(float(value), places) for value in values]
+    texts = [f"{value:{form}}" for value in values]
     return texts[0] if len(set(texts)) == 1 else " and ".join(texts)

@@ -212,4 +212,6 @@ def summary(source: Shown | Results) -> Summary:
         E-TYPE: these are no results.
     """
     results, _ = _as_results(source)
-    return Summary(*train_of(results.case).summary(results))
+    train = train_of(results.case)
+    sentence, judgements = train.summary(results)
+    return Summary(f"{train.duty(results.case)} {sentence}".strip(), judgements)

@@ -15,6 +15,8 @@ pytest.importorskip("playwright", reason="make test-browser installs it")
 pytestmark = pytest.mark.browser
 CASES = Path(__file__).parents[2] / "cases"
 DEMO = "planetary_27_40_108"
+MANY_MESHES = "ravigneaux_set"
+"""Longest cards and legends of page one."""
 TRAINS = (DEMO, "nrel_pgb", "helical_30_20_70", "four_stage_reducer", "grc_like_drivetrain", "gear_pair")
 WIDTHS = (1400, 420)
 DRAW = "document.querySelectorAll('.chart').forEach(page.draw)"
@@ -273,7 +275,7 @@ def test_hover_tells_the_line(opened):
     assert "order" in text and "Hz" in text and "m/s²" in text
 
 
-@pytest.mark.parametrize("name", TRAINS)
+@pytest.mark.parametrize("name", (*TRAINS, MANY_MESHES))
 def test_page_one_fits_a_screen_and_the_rest_is_folded_away(opened, name):
     tab = opened(name, unfold=False)
     box = tab.locator(".front").bounding_box()
@@ -288,7 +290,17 @@ def test_page_one_fits_a_screen_and_the_rest_is_folded_away(opened, name):
     tab.wait_for_function("(one) => one.open", arg=section.element_handle())
 
 
-@pytest.mark.parametrize("name", TRAINS)
+def test_long_legends_leave_room_for_their_charts(opened):
+    """A phone draws all charts of a gearbox with twelve meshes, whose legends are longer than their panels are high."""
+    tab = opened(MANY_MESHES, 420)
+    tab.evaluate(DRAW)
+    assert tab.locator(".chart:not([data-drawn])").count() == 0
+    tab = opened(MANY_MESHES, unfold=False)
+    names = tab.locator(".front .chart").last.locator(".legendtext").all_text_contents()
+    assert len(names) <= 4 and names[-1].endswith(" more, which the pointer names")
+
+
+@pytest.mark.parametrize("name", (*TRAINS, MANY_MESHES))
 def test_page_one_is_one_sheet_of_paper(opened, name):
     tab = opened(name, 794, unfold=False)
     tab.emulate_media(media="print")

@@ -55,6 +55,12 @@ def test_without_a_cause_in_the_numbers_none_is_named(data):
     assert "root sun 1.50 (see Stresses)" in row[1]
 
 
+def test_factors_of_helical_teeth_are_told_of_files_too(data):
+    """What is read from a file is a number of NumPy."""
+    data.attrs["iso_contact_helix_factor"] = np.float64(1.02)
+    assert all("Z_eps Z_beta" in reason.sentence for reason in stress_reasons(data) if "contact" in reason.title)
+
+
 def test_stresses_within_the_limit_need_no_reason(data):
     data["iso_root_stress"] = data["root_worst"] / (DIFFERS - 1e-9)
     data["iso_contact_stress"] = ("mesh", largest_pressure(data) * (DIFFERS - 1e-9))

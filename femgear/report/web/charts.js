@@ -136,7 +136,20 @@ page.chartOf = (div) => {
   if (div.dataset.panel === undefined) return chart;
   const panel = chart.panels[Number(div.dataset.panel)], titles = chart.panels.map(({ x }) => x.title).filter(Boolean);
   const x = { ...panel.x, title: panel.x.title || titles[titles.length - 1] };
-  return { ...chart, rows: 1, columns: 1, size: [8, div.closest(".many") ? 1.3 : div.closest(".both") || div.closest(".paper") ? 1.9 : 3.4], least: div.closest(".many") ? 90 : 120, title: "", panels: [{ ...panel, x, place: [0, 1, 0, 1], shared: 0 }] };
+  // slanted words at the ends of lines lie flat, which takes less room above the panel
+  const words = panel.words.map((word) => (!word.paper && word.angle % 90 ? { ...word, angle: 0, align: ["center", word.align[1]] } : word));
+  return { ...chart, rows: 1, columns: 1, size: [8, div.closest(".many") ? 1.3 : div.closest(".both") || div.closest(".paper") ? 1.75 : 3.4], least: div.closest(".many") ? 90 : 110, title: "", panels: [{ ...panel, x, words, place: [0, 1, 0, 1], shared: 0 }] };
+};
+
+// the legend of a small chart has the largest curves, and tells how many more there are; returns its entries
+page.shorten = (traces, count, most) => {
+  if (count <= Math.max(most, 4)) return count;
+  const size = ({ y }) => Math.max(...y.map((value) => (Number.isFinite(value) ? Math.abs(value) : 0)));
+  const named = traces.filter((one) => one.showlegend).sort((a, b) => size(b) - size(a));
+  named.slice(most - 1).forEach((one) => { one.showlegend = false; });
+  const { xaxis, yaxis } = traces[0];
+  traces.push({ x: [null], y: [null], xaxis, yaxis, mode: "lines", line: { color: "rgba(0,0,0,0)" }, name: `${count - most + 1} more, which the pointer names` });
+  return most;
 };
 
 page.draw = (div) => {
@@ -165,12 +178,19 @@ page.draw = (div) => {
       notes.push({ text: page.wrapped(panel.title, pixels).text, xref: "paper", yref: "paper", x: place.x[0], y: place.y[1],
         xanchor: "left", yanchor: "bottom", showarrow: false, align: "left", font: { size: narrow ? 11 : 12.5 } });
     }
-    const kept = []; // of upright words of a small chart those that leave room for one another
+    const kept = []; // words of a small chart that leave room for one another: [left, right, low, high] of each [px]
     panel.words.forEach((word) => {
-      if (chart.least && word.angle && !word.paper && panel.x.range) {
-        const [low, high] = panel.x.range, across = ((word.x - low) / (high - low)) * inner.w;
-        if (kept.some((other) => Math.abs(other - across) < 14)) return;
-        kept.push(across);
+      if (chart.least && !word.paper && panel.x.range && panel.y.range) {
+        const along = (value, axis, side) => { const at = axis.log ? Math.log10 : Number, [low, high] = axis.range.map(at);
+          return ((at(value) - low) / (high - low)) * side; };
+        const across = along(word.x, panel.x, inner.w) + word.shift[0], up = along(word.y, panel.y, inner.h) - word.shift[1];
+        const [wide, tall] = word.angle ? [14, 6.4 * word.text.length] : [6.4 * word.text.length, 12];
+        const begin = across - { left: 0, center: 0.5, right: 1 }[word.align[0]] * wide;
+        const low = up - { bottom: 0, baseline: 0, center: 0.5, top: 1 }[word.align[1]] * tall;
+        const box = [begin, begin + wide, low, low + tall];
+        if (box[1] > inner.w + gaps.right) return;
+        if (kept.some((other) => box[0] < other[1] && other[0] < box[1] && box[2] < other[3] && other[2] < box[3])) return;
+        kept.push(box);
       }
       const align = { center: "center", left: "left", right: "right" }, high = { bottom: "bottom", top: "top", center: "middle", baseline: "bottom" };
       const own = word.paper ? { xref: key.x + " domain", yref: key.y + " domain" } : { xref: key.x, yref: key.y };
@@ -182,9 +202,10 @@ page.draw = (div) => {
   });
   layout.annotations = notes;
   layout.showlegend = seen.size > 1;
-  // room for the lines of a legend beyond the first, before the panels of a small chart are squeezed to nothing
+  // room for the lines of a legend beyond the first, before the panels of a small or narrow chart are squeezed to nothing
   const longest = Math.max(0, ...[...seen].map((name) => name.length)), each = Math.max(1, Math.floor((width - 90) / (45 + 6.2 * longest)));
-  const more = layout.showlegend && chart.least ? 19 * (Math.ceil(seen.size / each) - 1) : 0;
+  const listed = chart.least ? page.shorten(traces, seen.size, Math.max(3, 2 * each)) : seen.size;
+  const more = layout.showlegend && (chart.least || narrow) ? 19 * (Math.ceil(listed / each) - 1) : 0;
   layout.height = height + more;
   layout.margin.b = gaps.bottom + more;
   Plotly.react(div, traces, layout, { displaylogo: false, responsive: false, displayModeBar: "hover",

@@ -47,8 +47,9 @@ def _noise(results: Any) -> Judgement:
     order = float(orders[line])
     hertz = order * carrier / (2.0 * np.pi)
     share = 0.5 * (size[line] / level[at]) ** 2 if level[at] > 0.0 else 0.0
-    main = f"order {order:g} ({hertz:,.0f} Hz{_nearest_mode(results, hertz)}) makes {share:.0%} of the power"
-    sentence = f"At {speed:,.4g} rpm it has {level[at]:.3g} m/s²{at_microphone}: {main}"
+    origin = _origin(round(order), results.case.ring.teeth)
+    main = f"order {order:g} ({origin}{hertz:,.0f} Hz{_nearest_mode(results, hertz)}) makes {share:.0%} of the power"
+    sentence = f"At {speed:,.4g} rpm the housing has {level[at]:.3g} m/s²{at_microphone}: {main}"
     if decisive := most_decisive(results):
         sentence += f", with half and twice of what is assumed: {decisive}"
     margins = tuple(_margins(results))
@@ -74,6 +75,15 @@ def _margins(results: Any) -> Iterator[LevelMargin]:
         yield margin_of_levels(speed, level - limit_at(limits.microphone.level_limit, speed), "the microphone")
 
 
+def _origin(order: int, teeth: int) -> str:
+    """Write an order of the carrier as mesh harmonic, of which it makes one a tooth of the ring, with its side band."""
+    harmonic = round(order / teeth)
+    beside = order - harmonic * teeth
+    if not harmonic:
+        return ""
+    return f"mesh harmonic {harmonic}{f', side band {beside:+d}' if beside else ''}, "
+
+
 def _nearest_mode(results: Any, hertz: float) -> str:
     """Write the mode nearest to a frequency, empty without modes or where none is within a fifth."""
     if "modes" not in results.stages:
@@ -96,5 +106,6 @@ def _resonance(runup: Any) -> str:
         return ""
     at = int(makes.argmax())
     mode, harmonic = int(runup["mode"].values[at]), int(runup["mesh_harmonic"].values[at])
-    speed = float(runup["operating_speed"].values[at])
-    return f"mode {mode} meets mesh harmonic {harmonic} {distance[at]:+.1f} % from {speed:,.4g} rpm"
+    speed, side = float(runup["operating_speed"].values[at]), "below" if distance[at] < 0.0 else "above"
+    meeting = f"mode {mode} meets mesh harmonic {harmonic}, {abs(distance[at]):.1f} % {side} {speed:,.4g} rpm"
+    return f"{meeting}: {min(makes[at] ** 2, 1.0):.0%} of the power alone"

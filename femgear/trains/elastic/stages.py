@@ -60,6 +60,7 @@ from femgear.solvers.linear.resonances import (
 from femgear.solvers.periodic.spectral import joint_message, solve_spectral
 from femgear.solvers.stability.parametric import decisive_harmonics
 from femgear.stages.assumptions import Assumption, AssumptionsResult, describe_assumptions, solve_assumptions
+from femgear.stages.duty import set_duty
 from femgear.stages.friction_source import balanced_source
 from femgear.stages.gears_in_space import case_bodies
 from femgear.stages.heat import HEAT
@@ -924,6 +925,7 @@ ELASTIC = Train(
     dynamic_model=elastic_dynamic_model,
     bodies=case_bodies,
     judgements=set_with_ring_judgements,
+    duty=set_duty,
     front=(("run_up_levels", 0), ("static_transmission_error", 0), ("load_sharing", 0)),
     figures=FiguresOf("femgear.trains.elastic.figures:FIGURES"),
     recorded=Recorded(

@@ -30,7 +30,7 @@ from femgear.stages.judgements import (
 from femgear.stages.key_figures import REFERENCE_ACCELERATION
 from femgear.stages.strength import OF_ROOTS
 from femgear.stages.strength_results import SYMBOLS, taken_as_one
-from femgear.trains.gearbox.mode_words import nearest_mode
+from femgear.trains.gearbox.mode_words import near_mode
 from femgear.trains.gearbox.response_results import line_origin, main_way
 from femgear.trains.gearbox.strength import least_safety
 
@@ -50,6 +50,9 @@ def gearbox_judgements(results: Any) -> Iterator[Judgement]:
     yield judge_smoothness(_motion(results), results, _RESPONSES)
     if "dynamics" in stages and results.dynamics.sizes.get("sensor", 0):
         yield _noise(results)
+    else:
+        open_words = "femgear casing CASE gives a gearbox a casing with sensors"
+        yield judge_noise("no sensor in this run", _largest_force(results), open_words=open_words)
     yield judge_numbers(findings, results.manifest.complete)
 
 
@@ -65,7 +68,7 @@ def _strength(results: Any) -> Judgement:
     if shown and all(not least.over_life and safety and safety[1][0] == chosen for least, safety in shown):
         missing -= {"dynamic"}  # the response is one of the chosen load case
     with_teeth = [stage.name for stage in (*case.pair, *case.planetary) if stage.teeth]
-    remedy = "no stage has teeth of its own, which safeties are of"
+    remedy = "no stage has teeth, which safeties are of"
     if with_teeth:
         remedy = f"give treatment and hardness in the material of the teeth of {merged_names(with_teeth)}"
     return judge_strength(
@@ -119,6 +122,17 @@ def _motion(results: Any) -> str:
     return ", ".join(parts) or "-"
 
 
+def _largest_force(results: Any) -> str:
+    """Write where the mesh forces of the run-up, or of the load case, are largest over their means; empty without."""
+    stage = next((name for name in ("runup", "dynamics") if name in results.stages), None)
+    factors = np.array([]) if stage is None else results[stage]["dynamic_factor"].values
+    if not np.isfinite(factors).any():
+        return ""
+    speed, number, _ = np.unravel_index(int(np.nanargmax(factors)), factors.shape)
+    where = f"{results[stage]['stage'].values[number]} at {results[stage]['speed'].values[speed]:,.4g} rpm"
+    return f"Its mesh forces reach {np.nanmax(factors):.2f} times their mean ({where})"
+
+
 def _noise(results: Any) -> Judgement:
     """Judge the level at the loudest sensor, with its main line and the way most of it comes by."""
     data, modes = results.dynamics, results.modes if "modes" in results.stages else None
@@ -131,11 +145,12 @@ def _noise(results: Any) -> Judgement:
     size = np.hypot(data["lines_real"].values[0, sensor], data["lines_imag"].values[0, sensor])
     line = int(size.argmax())
     hertz = float(data["order"].values[line]) * speed / 60.0
-    near = "" if modes is None else f", near {nearest_mode(modes, hertz)},"
+    mode = "" if modes is None else near_mode(modes, hertz)
+    near = f", near {mode}," if mode else ""
     main = (
         f"{line_origin(data, line)} at {hertz:,.0f} Hz{near} makes {0.5 * (size[line] / whole) ** 2:.0%} of the power"
     )
-    sentence = f"At {speed:,.4g} rpm {name} has {_level(whole)}: {main}"
+    sentence = f"At {speed:,.4g} rpm sensor {name} has {_level(whole)}: {main}"
     if "path_share" in data:
         sentence += f"; most of it comes by {main_way(data, sensor)}"
     if "runup" in results.stages and "level" in results.runup:

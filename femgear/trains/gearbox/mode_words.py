@@ -7,6 +7,9 @@ from typing import Any
 
 import numpy as np
 
+NEAR = 0.2
+"""Distance over the frequency of a line up to which a mode is near it."""
+
 
 def mode_distance(data: Any) -> float:
     """Compute how far the mesh line nearest to a mode is from it, over the frequency of the mode; of modes.nc."""
@@ -31,6 +34,13 @@ def mesh_lines_and_modes(data: Any) -> tuple[np.ndarray, list[tuple[str, float]]
     return np.abs(np.log(np.array([line for _, line in lines])[:, None] / modes)), lines, modes
 
 
+def near_mode(data: Any, frequency: float) -> str:
+    """Write the mode of modes.nc that a frequency [Hz] is near, see `nearest_mode`; empty where none is."""
+    hertz = data["frequency"].values
+    near = (hertz > 0.0) & (np.abs(hertz - frequency) <= NEAR * frequency)
+    return nearest_mode(data, frequency) if near.any() else ""
+
+
 def nearest_mode(data: Any, frequency: float) -> str:
     """Write which mode of modes.nc is nearest to a frequency [Hz], with its kind and what moves most in it."""
     hertz = data["frequency"].values
@@ -39,4 +49,4 @@ def nearest_mode(data: Any, frequency: float) -> str:
         return "no mode"
     number = int(elastic[np.abs(np.log(hertz[elastic] / frequency)).argmin()])
     kind, member = data["kind"].values[number], data["main_member"].values[number]
-    return f"mode {number + 1} {hertz[number]:.0f} Hz ({kind if kind == member else f'{kind}, {member}'})"
+    return f"mode {number + 1} at {hertz[number]:.0f} Hz ({kind if kind == member else f'{kind}, {member}'})"

@@ -532,7 +532,7 @@ def main_way(data: xr.Dataset, sensor: int) -> str:
 def line_origin(data: xr.Dataset, line: int) -> str:
     """Write where a line comes from: stage, mesh harmonic, turns of the carrier beside it."""
     harmonic, band = int(data["harmonic"].values[line]), int(data["side_band"].values[line])
-    side = f" {band:+d} x carrier" if band else ""
+    side = f" {'-' if band < 0 else '+'} {abs(band)} x carrier" if band else ""
     return (
         f"{data['origin'].values[line]}, mesh harmonic {harmonic}{side}"
         if harmonic

@@ -13,6 +13,7 @@ from femgear.case.dependencies import Steps, box_entries, load_case_entries
 from femgear.case.quantities import RPM
 from femgear.report.tables import Block, merged_names, tabulate
 from femgear.stages.drawing_tables import describe_drawing
+from femgear.stages.duty import ShaftEnd, duty_sentence
 from femgear.stages.protocol import FiguresOf, Progress, Stage, Train, modes_verdict, one_blas_thread, silent
 from femgear.trains.gearbox.balance import (
     GearboxBalanceResult,
@@ -196,6 +197,14 @@ def _drawing_blocks(case: GearboxCase) -> Iterator[Block]:
         yield replace(block, title=f"{block.title}, {merged_names(names)}")
 
 
+def gearbox_duty(case: GearboxCase) -> str:
+    """Write what a gearbox does in its chosen load case."""
+    load_cases, shafts = case.operation.load_case, port_shafts(case)
+    flow = gearbox_flow(case, case.load_case)
+    ends = [ShaftEnd(name, torque, (flow.speed[shafts[name]],)) for name, torque in flow.port_torque.items()]
+    return duty_sentence(ends, f"{case.load_case.name}, one of {len(load_cases)} load cases" if load_cases[1:] else "")
+
+
 def _flow_blocks(case: GearboxCase, load_case: LoadCaseSection) -> Iterator[Block]:
     flow = gearbox_flow(case, load_case)
     many = len(case.operation.load_case) > 1
@@ -362,6 +371,7 @@ GEARBOX = Train(
     heard=heard_stages,
     stands_in={"static": "deflection", "life": "deflection", "housing": "dynamics"},
     judgements=gearbox_judgements,
+    duty=gearbox_duty,
     front=(
         ("run_up_levels", 0),
         ("run_up_forces", 0),

@@ -20,7 +20,7 @@ from femgear.stages.losses_results import efficiency_rows
 from femgear.stages.planet_bearings import planet_bearing_rows
 from femgear.trains.gearbox.casing_results import largest_foot_force
 from femgear.trains.gearbox.life import shortest_life
-from femgear.trains.gearbox.mode_words import mesh_lines_and_modes, nearest_mode
+from femgear.trains.gearbox.mode_words import mesh_lines_and_modes, near_mode, nearest_mode
 from femgear.trains.gearbox.response_results import SENSORS_JUDGED, line_origin, main_way
 from femgear.trains.gearbox.strength import smallest_safeties
 from femgear.trains.gearbox.stress import box_reason_rows
@@ -150,7 +150,8 @@ def _main_line(data: Any, sensor: int, whole: float, modes: Any) -> str:
     line = int(size.argmax())
     hertz = float(data["order"].values[line]) * float(data["speed"].values[0]) / 60.0
     text = f"{hertz:.1f} Hz, {line_origin(data, line)}: {0.5 * (size[line] / whole) ** 2:.0%} of the power"
-    return text if modes is None else f"{text}; {nearest_mode(modes, hertz)}"
+    mode = "" if modes is None else near_mode(modes, hertz)
+    return f"{text}; {mode}" if mode else text
 
 
 def _forces(data: Any, name: str, marks: Marks, stage: str) -> Iterator[tuple[str, str]]:

@@ -21,6 +21,7 @@ from femgear.report.tables import describe_modes, describe_response
 from femgear.solvers.linear.modal import output_load, output_response, residual_output, source_output
 from femgear.solvers.periodic.spectral import joint_message, solve_spectral
 from femgear.solvers.stability.parametric import stability as floquet_verdict
+from femgear.stages.duty import set_duty
 from femgear.stages.friction_source import balanced_source
 from femgear.stages.gears_in_space import case_bodies
 from femgear.stages.heat import HEAT
@@ -359,6 +360,7 @@ HELICAL = Train(
     warnings=set_warnings,
     bodies=case_bodies,
     judgements=set_judgements,
+    duty=set_duty,
     front=(("speed_sweep", 0), ("helical_mesh_stiffness", 1), ("dynamic_transmission_error", 0)),
     figures=FiguresOf("femgear.trains.helical.figures:FIGURES"),
     remarks=_remarks,

@@ -46,6 +46,7 @@ from femgear.solvers.periodic.solution import PeriodicSolution
 from femgear.solvers.periodic.spectral import solve_spectral
 from femgear.solvers.stability.parametric import decisive_harmonics, stability
 from femgear.stages.drawing_tables import describe_drawing
+from femgear.stages.duty import pair_duty
 from femgear.stages.friction_source import balanced_source
 from femgear.stages.gears_in_space import case_bodies
 from femgear.stages.heat import HEAT
@@ -499,6 +500,7 @@ PAIR = Train(
     warnings=_warnings,
     bodies=case_bodies,
     judgements=set_judgements,
+    duty=pair_duty,
     front=(("run_up_levels", 1), ("static_transmission_error", 0)),
     figures={
         name: Figures({**figures.captions, **_CAPTIONS}, figures.draw, figures.write) if name == "static" else figures

@@ -22,6 +22,7 @@ from femgear.errors import CaseError, ConvergenceError
 from femgear.report.tables import describe_modes
 from femgear.solvers.linear.modal import undamped_modes
 from femgear.solvers.periodic.harmonic_balance import solve_harmonic_balance
+from femgear.stages.duty import set_duty
 from femgear.stages.gears_in_space import case_bodies
 from femgear.stages.heat import HEAT
 from femgear.stages.life import LIFE, no_load_cases
@@ -453,6 +454,7 @@ PLANAR = Train(
     warnings=planar_warnings,
     bodies=case_bodies,
     judgements=set_judgements,
+    duty=set_duty,
     front=(("weight_response", 0), ("tooth_contact", 0), ("response_mesh_forces", 0)),
     figures=FiguresOf("femgear.trains.planar.figures:FIGURES"),
     verdict=strength_verdict,

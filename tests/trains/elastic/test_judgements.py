@@ -65,14 +65,14 @@ def judged(results):
 
 def test_the_main_line_is_that_of_the_acceleration_with_its_mode(results):
     noise = judged(results)
-    assert "order 216 (2,160 Hz, mode 2: ring) makes 80% of the power" in noise.sentence
+    assert "order 216 (mesh harmonic 2, 2,160 Hz, mode 2: ring) makes 80% of the power" in noise.sentence
     assert noise.sentence.endswith("Loudest of the run-up: 9 m/s² at 4,000 rpm")
     assert noise.answer == "3.16 m/s² at 3,000 rpm"
 
 
 def test_a_resonance_that_makes_the_level_deserves_a_look(results):
     assert judged(results).state == "look"
-    assert judged(results).limit == "mode 7 meets mesh harmonic 2 -1.6 % from 3,000 rpm"
+    assert judged(results).limit == "mode 7 meets mesh harmonic 2, 1.6 % below 3,000 rpm: 64% of the power alone"
     results.runup["distance"].values[1] = 12.0
     assert judged(results).state == "open"
 

@@ -3,7 +3,7 @@
 import pytest
 
 from femgear.storage.contents import Contents
-from femgear.trains.gearbox.mode_words import mesh_lines_and_modes, mode_distance, nearest_mode
+from femgear.trains.gearbox.mode_words import mesh_lines_and_modes, mode_distance, near_mode, nearest_mode
 
 
 @pytest.fixture(scope="module")
@@ -23,10 +23,16 @@ def modes():
 
 
 def test_the_nearest_mode_is_the_nearest_in_octaves(modes):
-    assert nearest_mode(modes, 10.0) == "mode 3 10 Hz (casing)"
-    assert nearest_mode(modes, 40.0) == "mode 5 80 Hz (mixed, output)"
-    assert nearest_mode(modes, 39.8) == "mode 4 20 Hz (bending, rotor)"
+    assert nearest_mode(modes, 10.0) == "mode 3 at 10 Hz (casing)"
+    assert nearest_mode(modes, 40.0) == "mode 5 at 80 Hz (mixed, output)"
+    assert nearest_mode(modes, 39.8) == "mode 4 at 20 Hz (bending, rotor)"
     assert nearest_mode(modes, 0.0) == "no mode"
+
+
+def test_a_mode_is_near_within_a_fifth_of_the_line(modes):
+    assert near_mode(modes, 10.0) == nearest_mode(modes, 10.0)
+    assert near_mode(modes, 66.8) == nearest_mode(modes, 66.8) and near_mode(modes, 66.5) == ""
+    assert near_mode(modes, 40.0) == near_mode(modes, 0.0) == ""
 
 
 def test_distance_is_that_of_the_mesh_line_nearest_to_an_elastic_mode(modes):
