@@ -53,7 +53,7 @@ class ShaftEnd:
     def words(self) -> str:
         """Torque and speeds in words: ``60 N m at 250 to 3,100 rpm (sun)``."""
         sizes = sorted({abs(speed) / RPM for speed in self.speeds})
-        between = " to ".join(map(rounded, sizes[:: max(len(sizes) - 1, 1)]))
+        between = " to ".join(map(in_digits, sizes[:: max(len(sizes) - 1, 1)]))
         return f"{_torque(abs(self.torque))}{f' at {between} rpm' if between else ''} ({self.name})"
 
 
@@ -109,7 +109,7 @@ def pair_duty(case: Any) -> str:
     )
 
 
-def rounded(value: float) -> str:
+def in_digits(value: float) -> str:
     """Write a number with at least three digits and separators of thousands."""
     if value == 0.0 or not math.isfinite(value):
         return f"{value:g}"
@@ -124,10 +124,10 @@ def _and(ends: Sequence[ShaftEnd]) -> str:
 
 def _torque(torque: float) -> str:
     """Write a torque, large ones in kilonewtons."""
-    return f"{rounded(1e-3 * torque)} kN m" if torque >= _LARGE else f"{rounded(torque)} N m"
+    return f"{in_digits(1e-3 * torque)} kN m" if torque >= _LARGE else f"{in_digits(torque)} N m"
 
 
 def _power(power: float) -> str:
     """Write a power with the unit that suits its size."""
     unit, size = next(((unit, size) for unit, size in _POWERS if power >= size), _POWERS[-1])
-    return f"{rounded(power / size)} {unit}"
+    return f"{in_digits(power / size)} {unit}"

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from femgear.stages.duty import ShaftEnd, duty_sentence, pair_duty, rounded, set_duty
+from femgear.stages.duty import ShaftEnd, duty_sentence, in_digits, pair_duty, set_duty
 from femgear.trains.reading import read_case, with_values
 from femgear.trains.registry import train_of
 
@@ -45,7 +45,7 @@ def test_large_torques_are_in_kilonewtons():
     "value, text", [(0.0, "0"), (0.01234, "0.0123"), (999.4, "999"), (1166.3, "1,166"), (4.183e6, "4,183,000")]
 )
 def test_numbers_have_separators_of_thousands(value, text):
-    assert rounded(value) == text
+    assert in_digits(value) == text
 
 
 def test_a_set_turns_by_willis_and_keeps_its_power():
@@ -54,7 +54,7 @@ def test_a_set_turns_by_willis_and_keeps_its_power():
         read_case(CASES / "planetary_27_40_108.toml"),
         {"operation.torque": "60 N m", "operation.speeds": ["1000 rpm"]},
     )
-    power = rounded(60.0 * 1000.0 * RPM * 1e-3)
+    power = in_digits(60.0 * 1000.0 * RPM * 1e-3)
     assert set_duty(case) == f"60 N m at 1,000 rpm (sun) make 300 N m at 200 rpm (carrier): {power} kW, ratio 5."
     back = with_values(case, {"operation.torque": "-60 N m"})
     assert set_duty(back).startswith("300 N m at 200 rpm (carrier) make 60 N m at 1,000 rpm (sun): ")
