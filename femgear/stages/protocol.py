@@ -344,8 +344,6 @@ class Train:
         ``(case) -> figures`` by which cases are compared, none of trains whose studies have quantities of their own.
     judgements : callable
         ``(Results) -> judgements``: the questions that page one answers, in their order.
-    duty : callable
-        ``(case) -> sentence`` that says what the train does, empty of trains without a power flow.
     bodies : callable, optional
         ``(case) -> bodies`` of it in space, as `femgear.report.space.SpaceBody`; None of trains whose gears have no
         teeth.
@@ -362,6 +360,8 @@ class Train:
         ``(case) -> stages``: planetary stages that recordings tell, by name; None of trains that are no gearbox.
     stands_in : mapping of str to str
         Stages of other trains, with the stage of this one that has their results.
+    duty : callable
+        ``(case) -> sentence`` that says what the train does, empty of trains without a power flow.
     """
 
     name: str
@@ -375,7 +375,6 @@ class Train:
     verdict: Callable[[Results], Iterable[Block]] = lambda results: ()
     key_figures: Callable[[Any], tuple[KeyFigure, ...]] = lambda case: ()
     judgements: Callable[[Results], Iterable[Judgement]] = lambda results: ()
-    duty: Callable[[Any], str] = lambda case: ""
     bodies: Callable[[Any], Iterable[SpaceBody]] | None = None
     draft_casing: Callable[[Any], tuple[str, tuple[Finding, ...]]] | None = None
     dynamic_model: Callable[[Any, Mapping[str, Any]], DynamicModel] | None = None
@@ -383,6 +382,7 @@ class Train:
     front: tuple[tuple[str, int], ...] = ()
     heard: Callable[[Any], Mapping[str, HeardSet]] | None = None
     stands_in: Mapping[str, str] = field(default_factory=dict)
+    duty: Callable[[Any], str] = lambda case: ""
 
     def stage(self, name: str) -> Stage | None:
         """Find the stage of a name, None where the train has none of it."""
