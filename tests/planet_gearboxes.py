@@ -314,3 +314,59 @@ def outer_lines(make, *, fixed, torque, motions="plane", planets=3):
     first, feet = 2 + 3 * len(names), 3 * len(response.deflection.model.casing.feet)
     rows = [0, 1, *(2 + 3 * number + way for number in central for way in range(3)), *range(first, first + feet)]
     return lines_of(response, rows)
+
+
+BENDING = (11, 16, 8, 35)
+"""Sun, both gears of a planet, ring: 70 meshes of the sun and 35 of the ring in a turn of the carrier."""
+MODULE, LENGTH = 2e-3, 40e-3
+"""Transverse module, and length of a planet between its gears [m]."""
+CENTRAL = {
+    "sun": ("2 kg", "2e-3 kg m^2", "1e8 N/m"),
+    "carrier": ("8 kg", "3e-2 kg m^2", "5e8 N/m"),
+    "ring": ("4 kg", "2e-2 kg m^2", "6e8 N/m"),
+}
+"""Mass, inertia and radial stiffness."""
+
+
+def bending_set(angle: float, *, back: bool):
+    """Tables of stepped planets, each a shaft of two stations with a helical gear and a bearing on the carrier at both.
+
+    In a casing on uneven feet; the first planet stands at an angle [rad].
+    """
+    tables = {"shaft": [], "mass": [], "bearing": [], "pair": []}
+    for name, (mass, inertia, radial) in CENTRAL.items():
+        held = {"radial": radial, "axial": "2e8 N/m", "tilt": "1e6 N m/rad", "torsional": "2e5 N m/rad"}
+        tables["shaft"].append({"name": name})
+        tables["mass"].append({"shaft": name, "mass": mass, "inertia": inertia, "transverse_inertia": inertia})
+        tables["bearing"].append({"shaft": name, **held})
+    distance, ends = 0.5e3 * MODULE * (BENDING[0] + BENDING[1]), (0.0, 1e3 * LENGTH)
+    for number in range(3):
+        name, psi = f"p{number}", angle + 2.0 * math.pi * number / 3.0
+        shaft = {"name": name, "start": f"{-0.5 * ends[1]!r} mm", "longest_element": "1 m"}
+        shaft["axis"] = [f"{distance * math.cos(psi)!r} mm", f"{distance * math.sin(psi)!r} mm"]
+        shaft["part"] = [{"length": f"{ends[1]!r} mm", "outer_diameter": "10 mm"}]
+        tables["shaft"].append(shaft)
+        for end, radial in zip(ends, ("2e8 N/m", "1.5e8 N/m"), strict=True):
+            inertia = {"inertia": "5e-5 kg m^2", "transverse_inertia": "6e-5 kg m^2"}
+            tables["mass"].append({"shaft": name, "position": f"{end!r} mm", "mass": "0.3 kg", **inertia})
+            seat = {
+                "position": f"{end!r} mm",
+                "outer_shaft": "carrier",
+                "outer_position": f"{end - 0.5 * ends[1]!r} mm",
+            }
+            held = {"radial": radial, "axial": "5e7 N/m", "tilt": "3e4 N m/rad"}
+            tables["bearing"].append({"name": f"pin {number} at {end:g}", "shaft": name, **seat, **held})
+    places = {"sun": -0.5 * ends[1], "ring": 0.5 * ends[1]}
+    for mate, teeth, end in (("sun", BENDING[:2], ends[0]), ("ring", BENDING[2:], ends[1])):
+        for number in range(3):
+            shafts = ("sun", f"p{number}") if mate == "sun" else (f"p{number}", "ring")
+            positions = [f"{places[name] if name in places else end!r} mm" for name in shafts]
+            mesh = {"stiffness": "3e8 N/m", "contact_ratio": 1.6, "low_share": 0.7}
+            sizes = pair(f"{mate} {number}", shafts, teeth, MODULE, internal=mate == "ring", mesh=mesh)
+            sizes["gears"] |= {"face_width": "20 mm", "helix_angle": "15 deg"}
+            tables["pair"].append(sizes | {"positions": positions})
+    speed = -12000.0 if back else 12000.0
+    return loaded(tables, 100.0, speed, "carrier", ("ring",)) | {
+        "deflection": {"slices": 1},
+        "casing": casing_tables(),
+    }

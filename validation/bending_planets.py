@@ -5,83 +5,32 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
-from casings import casing_tables
-from planet_gearboxes import loaded, pair
+from planet_gearboxes import bending_set
+from scipy.integrate import solve_ivp
 
 from femgear.housing.two_way.running_planets import RunningStage
+from femgear.solvers.time.transient import solve_transient
 from femgear.system.assembly import GROUND, Assembly
 from femgear.system.system import MechanicalSystem
 from femgear.trains.gearbox.carrier import pin_axes
 from femgear.trains.gearbox.deflection import Deflection, solve_deflection
 from femgear.trains.gearbox.excitation import pair_count_excitation
+from femgear.trains.gearbox.modes import linear_system
+from femgear.trains.gearbox.nonlinear import NonlinearGearbox, nonlinear_gearbox
 from femgear.trains.gearbox.planet_branches import RunningSet, running_sets
 from femgear.trains.gearbox.planet_shafts import pair_phases
 from femgear.trains.gearbox.running_branches import branch_stage
 from femgear.trains.gearbox.stage_structure import structure_apart
+from femgear.trains.gearbox.turning_planets import centrifugal_pull, turning_planets, wave_generator
 from femgear.trains.reading import read_case
 from validation.gearbox_in_time import ANGLE, BY_MASS, BY_STIFFNESS, IN_TIME, apart_in_time
 from validation.reference.running_in_time import TurningSystem
 from validation.rows import Row, at_most
 
-TEETH = (11, 16, 8, 35)
-"""Sun, both gears of a planet, ring: 70 meshes of the sun and 35 of the ring in a turn of the carrier."""
-MODULE, LENGTH = 2e-3, 40e-3
-"""Transverse module, and length of a planet between its gears [m]."""
 TIME_CONSTANT = 1e-6
 """Viscous damping of the bearings of planets over their stiffness [s]."""
-CENTRAL = {
-    "sun": ("2 kg", "2e-3 kg m^2", "1e8 N/m"),
-    "carrier": ("8 kg", "3e-2 kg m^2", "5e8 N/m"),
-    "ring": ("4 kg", "2e-2 kg m^2", "6e8 N/m"),
-}
-"""Mass, inertia and radial stiffness."""
-
-
-def bending_set(angle: float, *, back: bool) -> dict[str, Any]:
-    """Tables of stepped planets, each a shaft of two stations with a helical gear and a bearing on the carrier at both.
-
-    In a casing on uneven feet; the first planet stands at an angle [rad].
-    """
-    tables: dict[str, Any] = {"shaft": [], "mass": [], "bearing": [], "pair": []}
-    for name, (mass, inertia, radial) in CENTRAL.items():
-        held = {"radial": radial, "axial": "2e8 N/m", "tilt": "1e6 N m/rad", "torsional": "2e5 N m/rad"}
-        tables["shaft"].append({"name": name})
-        tables["mass"].append({"shaft": name, "mass": mass, "inertia": inertia, "transverse_inertia": inertia})
-        tables["bearing"].append({"shaft": name, **held})
-    distance, ends = 0.5e3 * MODULE * (TEETH[0] + TEETH[1]), (0.0, 1e3 * LENGTH)
-    for number in range(3):
-        name, psi = f"p{number}", angle + 2.0 * math.pi * number / 3.0
-        shaft: dict[str, Any] = {"name": name, "start": f"{-0.5 * ends[1]!r} mm", "longest_element": "1 m"}
-        shaft["axis"] = [f"{distance * math.cos(psi)!r} mm", f"{distance * math.sin(psi)!r} mm"]
-        shaft["part"] = [{"length": f"{ends[1]!r} mm", "outer_diameter": "10 mm"}]
-        tables["shaft"].append(shaft)
-        for end, radial in zip(ends, ("2e8 N/m", "1.5e8 N/m"), strict=True):
-            inertia = {"inertia": "5e-5 kg m^2", "transverse_inertia": "6e-5 kg m^2"}
-            tables["mass"].append({"shaft": name, "position": f"{end!r} mm", "mass": "0.3 kg", **inertia})
-            seat = {
-                "position": f"{end!r} mm",
-                "outer_shaft": "carrier",
-                "outer_position": f"{end - 0.5 * ends[1]!r} mm",
-            }
-            held = {"radial": radial, "axial": "5e7 N/m", "tilt": "3e4 N m/rad"}
-            tables["bearing"].append({"name": f"pin {number} at {end:g}", "shaft": name, **seat, **held})
-    places = {"sun": -0.5 * ends[1], "ring": 0.5 * ends[1]}
-    for mate, teeth, end in (("sun", TEETH[:2], ends[0]), ("ring", TEETH[2:], ends[1])):
-        for number in range(3):
-            shafts = ("sun", f"p{number}") if mate == "sun" else (f"p{number}", "ring")
-            positions = [f"{places[name] if name in places else end!r} mm" for name in shafts]
-            mesh = {"stiffness": "3e8 N/m", "contact_ratio": 1.6, "low_share": 0.7}
-            sizes = pair(f"{mate} {number}", shafts, teeth, MODULE, internal=mate == "ring", mesh=mesh)
-            sizes["gears"] |= {"face_width": "20 mm", "helix_angle": "15 deg"}
-            tables["pair"].append(sizes | {"positions": positions})
-    speed = -12000.0 if back else 12000.0
-    return loaded(tables, 100.0, speed, "carrier", ("ring",)) | {
-        "deflection": {"slices": 1},
-        "casing": casing_tables(),
-    }
 
 
 @dataclass(frozen=True)
@@ -154,9 +103,14 @@ def set_at_rest(*, back: bool) -> _AtRest:
     return _AtRest(found, running, structure, motions, rest.motions.shape[1])
 
 
-def _turning_rows(at_rest: _AtRest, first: str, sense: int, *, back: bool) -> Callable[[float], np.ndarray]:
-    """Approaches of the meshes with a member, then of all others, then of bearings, where the carrier has turned."""
-    running, model = at_rest.running, at_rest.found.model
+def _turning_rows(
+    found: Deflection, running: RunningSet, first: str, sense: int, *, back: bool
+) -> Callable[[float], np.ndarray]:
+    """Approaches of the meshes with a member, then of all others, then of bearings, where the carrier has turned.
+
+    Per unit of all motions.
+    """
+    model = found.model
     meshes = [
         stage.meshes[0] for stage in sorted(model.stages, key=lambda stage: (first not in stage.name, stage.name))
     ]
@@ -174,7 +128,7 @@ def _turning_rows(at_rest: _AtRest, first: str, sense: int, *, back: bool) -> Ca
                     assert station != GROUND
                     moved[:, 6 * station : 6 * station + 6] += springs.rows[:, 6 * place : 6 * place + 6]
                 listed.append(turned @ moved)
-        return np.vstack(listed) @ at_rest.motions
+        return np.vstack(listed)
 
     return rows
 
@@ -200,8 +154,10 @@ def turning_set(member: str, *, back: bool) -> tuple[TurningSystem, RunningStage
     dampers = TIME_CONSTANT * np.append(np.zeros(3), bearings)
     speed = abs(model.flow.speed["carrier"])
     teeth = round(2.0 * math.pi * model.flow.mesh_frequency[f"{member} 0"] / speed)
-    rows, drive = _turning_rows(at_rest, member, stage.sense, back=back), stage.excitation
-    turning = TurningSystem(rows, *at_rest.matrices(), springs, dampers, drive, teeth, speed, 2)
+    rows, drive = _turning_rows(found, running, member, stage.sense, back=back), stage.excitation
+    turning = TurningSystem(
+        lambda turn: rows(turn) @ at_rest.motions, *at_rest.matrices(), springs, dampers, drive, teeth, speed, 2
+    )
     shape = np.linalg.lstsq(at_rest.motions[:, : at_rest.own], structured.motion, rcond=None)[0]
     return turning, stage, shape.T
 
@@ -214,4 +170,109 @@ def bending_planets() -> list[Row]:
         name = f"stepped 11/16/8/35 that bends, meshes of the {member} excite{', backwards' if back else ''}"
         text = "lines of six motions of sun, carrier, ring and casing, largest difference over the largest line"
         rows.append(at_most(name, IN_TIME, text, 1e-6, apart))
+    return rows
+
+
+@dataclass(frozen=True)
+class _MeshesInTime:
+    """Meshes of a set in axes at rest, whose flanks part.
+
+    Parameters
+    ----------
+    waves : (3, R, n) array
+        Approaches of M meshes, then of springs, per unit of the coordinates: mean, cosine and sine of the carrier.
+    speed : float
+        Of the carrier, positive [rad/s].
+    frequency : (M,) array
+        Of the meshes [rad/s].
+    lines : list of (M, 3) arrays
+        Harmonics of stiffness, deflection and force, over the number of positions.
+    """
+
+    waves: np.ndarray
+    speed: float
+    frequency: np.ndarray
+    lines: list[np.ndarray]
+
+    def rows(self, time: float) -> np.ndarray:
+        """Approaches (R, n) at an instant."""
+        turn = self.speed * time
+        return self.waves[0] + math.cos(turn) * self.waves[1] + math.sin(turn) * self.waves[2]
+
+    def forces(self, time: float, rows: np.ndarray, q: np.ndarray) -> np.ndarray:
+        """Forces (M,) of the meshes at coordinates q [N]."""
+        phase = np.exp(1j * np.outer(self.frequency, [1.0, 2.0]) * time)
+        k, gap, force = (np.real(line[:, 0] + 2.0 * (line[:, 1:] * phase).sum(axis=1)) for line in self.lines)
+        return np.maximum(force + k * (rows[: len(k)] @ q - gap), 0.0)
+
+
+def parting_set(*, back: bool) -> tuple[Deflection, RunningSet, NonlinearGearbox]:
+    """Loaded state of the set, its planets, and the set with flanks that wave so much that they part."""
+    found = solve_deflection(read_case(bending_set(ANGLE, back=back)))
+    excitations = {stage.name: pair_count_excitation(found.model, stage) for stage in found.model.stages}
+    for name, record in excitations.items():
+        theta = 2.0 * math.pi * np.arange(record.stiffness.shape[1]) / record.stiffness.shape[1]
+        excitations[name] = replace(record, deflection=record.deflection + 1.4e-5 * np.cos(theta))
+    (running,) = running_sets(found.model.case)
+    return found, running, nonlinear_gearbox(found, excitations, harmonics=2, damping_ratio=0.0)
+
+
+def apart_at_rest(*, back: bool) -> tuple[float, float]:
+    """Difference of the motion in axes at rest over the motion, and share of time in which flanks are apart."""
+    found, running, box = parting_set(back=back)
+    model, planets, (assembly, _, _) = found.model, planet_stations(found, running), linear_system(found)
+    T, speed, system = box.motion, model.flow.speed["carrier"], box.problem.system
+    around = turning_planets(model, model.stages)["sun 0"]
+    own = replace(assembly, inertias=tuple(one for one in assembly.inertias if planets.issuperset(one.stations)))
+    pull = T.T @ centrifugal_pull(assembly, around, own.mass) @ T
+    still = np.array([not name.startswith("p") for name in system.dofs])
+    damping = BY_MASS * np.where(still[:, None] & still, system.M, 0.0)
+    problem = replace(box.problem, system=replace(system, K=system.K - pull, C=system.C + damping))
+    start = np.linalg.lstsq(T, found.motion, rcond=None)[0]
+    times = np.linspace(0.0, 0.05 * 2.0 * math.pi / abs(speed), 200)
+    known = {"start": (start, 0.0 * start), "method": "DOP853", "tolerance": 1e-10}
+    motion = solve_transient(problem, box.frequency, times, **known).displacement.T
+    springs = tuple(one for one in assembly.springs if planets.isdisjoint(one.stations))
+    C, K = damping + T.T @ assembly.gyroscopic @ T, T.T @ replace(assembly, springs=springs).stiffness @ T
+    inverse, load = np.linalg.inv(T.T @ assembly.mass @ T), T.T @ model.load
+    bearings = np.concatenate([np.diag(found.bearing_stiffness[n]) for numbers in running.pins for n in numbers])
+    meshes = _meshes_in_time(found, running, box, back=back)
+
+    def rate(time: float, state: np.ndarray) -> np.ndarray:
+        q, v = np.split(state, 2)
+        rows = meshes.rows(time)
+        force = np.append(meshes.forces(time, rows, q), bearings * (rows[len(meshes.frequency) :] @ q))
+        return np.concatenate([v, inverse @ (load - K @ q - C @ v - rows.T @ force)])
+
+    turned = np.linalg.lstsq(T, speed * wave_generator(around, len(T)) @ T @ start, rcond=None)[0]
+    begin = np.concatenate([start, turned])
+    twin = solve_ivp(rate, times[[0, -1]], begin, method="DOP853", t_eval=times, rtol=1e-10, atol=1e-16).y[: len(start)]
+    forces = [meshes.forces(time, meshes.rows(time), q) for time, q in zip(times, twin.T, strict=True)]
+    apart = np.abs(motion - twin)[still].max() / np.abs(twin - twin[:, :1])[still].max()
+    return float(apart), float(np.mean(np.equal(forces, 0.0)))
+
+
+def _meshes_in_time(found: Deflection, running: RunningSet, box: NonlinearGearbox, *, back: bool) -> _MeshesInTime:
+    """Meshes of the set, those of the sun first, by the coordinates of the nonlinear gearbox."""
+    speed = found.model.flow.speed["carrier"]
+    rows = _turning_rows(found, running, "sun", 1 if speed > 0.0 else -1, back=back)
+    a, b, c = (rows(angle) @ box.motion for angle in (0.0, 0.5 * math.pi, math.pi))
+    mean, records = 0.5 * (a + c), [stage.excitation for stage in box.stages]
+    lines = [
+        np.array([np.fft.rfft(getattr(record, name)[0])[:3] / record.stiffness.shape[1] for record in records])
+        for name in ("stiffness", "deflection", "force")
+    ]
+    frequency = box.frequency[[stage.mesh_base for stage in box.stages]]
+    return _MeshesInTime(np.stack([mean, 0.5 * (a - c), b - mean]), abs(speed), frequency, lines)
+
+
+def bending_in_time() -> list[Row]:
+    """Stepped planets that bend, all meshes at once, in time: coordinates that go round, and axes at rest."""
+    rows = list[Row]()
+    for back in (False, True):
+        apart, parted = apart_at_rest(back=back)
+        assert parted > 0.0
+        name = f"stepped 11/16/8/35 that bends, teeth part{', backwards' if back else ''}"
+        text = "motions of sun, carrier, ring and casing, largest difference over the largest motion"
+        rows.append(at_most(name, "time integration, SciPy's DOP853, in axes at rest", text, 1e-6, apart))
     return rows

@@ -27,8 +27,9 @@ from femgear.system.system import MechanicalSystem, MeshExcitation, NonlinearSys
 from femgear.trains.gearbox.balance import forces_of_bearings, loaded_lines
 from femgear.trains.gearbox.deflection import Deflection, solve_deflection
 from femgear.trains.gearbox.excitation import excitation_of
-from femgear.trains.gearbox.nonlinear import NonlinearGearbox, centrifugal_pull, nonlinear_gearbox, wave_generator
+from femgear.trains.gearbox.nonlinear import NonlinearGearbox, nonlinear_gearbox
 from femgear.trains.gearbox.stage_structure import running_stage
+from femgear.trains.gearbox.turning_planets import TurningPlanets, centrifugal_pull, planets_of_stage, wave_generator
 from femgear.trains.pair.model import pair_excitation, pair_model, separating_pair
 from femgear.trains.reading import read_case, with_values
 from validation.gearbox_in_time import ANGLE, helical_stage
@@ -117,11 +118,17 @@ def flank_forces(problem: NonlinearSystem, solution: PeriodicSolution, times: np
 
 def without_pull(found: Deflection, box: NonlinearGearbox) -> MechanicalSystem:
     """System without the pull of the pins on turning planets."""
-    stage = found.model.stages[0]
-    speed = found.model.flow.speed[stage.section.carrier]  # type: ignore[union-attr]
-    pull = centrifugal_pull(found.model, stage, planets_of(found).mass, speed)
+    assembly = planets_of(found)
+    pull = centrifugal_pull(assembly, turning(found), assembly.mass)
     system = box.problem.system
     return replace(system, K=system.K - box.motion.T @ pull @ box.motion)
+
+
+def turning(found: Deflection) -> TurningPlanets:
+    """Planets of the first stage, which go round."""
+    planets = planets_of_stage(found.model, found.model.stages[0])
+    assert planets is not None
+    return planets
 
 
 def planets_of(found: Deflection) -> Assembly:
@@ -275,7 +282,7 @@ def apart_at_rest(speed: float, turns: float = 0.04) -> tuple[float, float, floa
         return np.concatenate([v, inverse @ (force - rows[6:].T @ (springs * (rows[6:] @ q)))])
 
     whole = T @ start
-    begin = np.concatenate([whole[at], turn * (wave_generator(stage, assembly.count) @ whole)[at]])
+    begin = np.concatenate([whole[at], turn * (wave_generator(turning(found), assembly.count) @ whole)[at]])
     twin = solve_ivp(rate, (0.0, times[-1]), begin, method="DOP853", t_eval=times, rtol=1e-10, atol=1e-16)
     wanted, met = twin.y[: len(at)][~planets], (T @ motion.displacement.T)[at][~planets]
     apart = np.abs(met - wanted).max() / np.abs(wanted - wanted[:, :1]).max()

@@ -145,7 +145,7 @@ THEMES = (
             gearbox_planets.planet_errors,
             gearbox_planets.symmetric_lines,
         ),
-        (bending_planets.bending_planets,),
+        (bending_planets.bending_planets, bending_planets.bending_in_time),
     ),
     Theme(
         "losses",

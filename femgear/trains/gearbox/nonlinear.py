@@ -18,14 +18,13 @@ which turns with the carrier: a carrier that turns or tilts as a whole feels not
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from femgear.case.gear_set import line_play, planetary_set
-from femgear.fe.beam import rigid_link
 from femgear.gears.profile import base_helix_angle
 from femgear.solvers.linear.modal import undamped_modes
 from femgear.stages.static import mesh_backlash
@@ -37,19 +36,21 @@ from femgear.system.turning_meshes import (
     TurningDirections,
     TurningMeshes,
     independent_directions,
-    planet_wave_generator,
-    planet_waves,
-    turned_row,
 )
-from femgear.trains.gearbox.carrier import pin_axes
-from femgear.trains.gearbox.case_file import CASING, BoxPlanetarySection, PairSection, teeth_of
+from femgear.trains.gearbox.case_file import CASING, PairSection, teeth_of
 from femgear.trains.gearbox.deflection import Deflection, laws_of, spread_rows
 from femgear.trains.gearbox.model import GearboxModel, StageModel
 from femgear.trains.gearbox.modes import linear_system
+from femgear.trains.gearbox.planet_shafts import pair_phases
+from femgear.trains.gearbox.running_branches import ahead, kinds_in_time
 from femgear.trains.gearbox.stage_structure import equal_planets, in_time, rubbing_rows
-
-_TURNING = np.kron(np.eye(2), np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 0.0]]))
-"""Time derivative of the axes of a planet at unit speed of its carrier, ``e_r' = e_t``."""
+from femgear.trains.gearbox.turning_planets import (
+    TurningPlanets,
+    pin_changes,
+    turning_planets,
+    turning_rows,
+    turning_terms,
+)
 
 
 @dataclass(frozen=True)
@@ -178,20 +179,25 @@ def nonlinear_gearbox(
     """
     model = found.model
     chosen = [stage for stage in model.stages if stage.name in excitations]
-    assembly, stiffness, load = _structure(found, chosen)
+    around = turning_planets(model, chosen) if turning else {}
+    carriers = {planets.name: planets for planets in around.values()}
+    assembly, stiffness, load = _structure(found, chosen, carriers.values())
     T = assembly.motions
     rings = _rings(found, assembly)
     bases, frequency, staged = list[str](), list[float](), list[NonlinearStage]()
+    phases = pair_phases(model.case, model.flow)
     for stage in chosen:
-        turn = _carrier_speed(model, stage) if turning else 0.0
-        if turn:
-            bases.append(f"{stage.name} carrier")
-            frequency.append(abs(turn))
-        made = _stage(found, stage, excitations[stage.name], len(bases), turn, back=separates and back_flanks)
+        planets = around.get(stage.name)
+        if planets is not None and planets.name not in bases:
+            bases.append(planets.name)
+            frequency.append(abs(planets.speed))
+        record = _in_time(found, stage, excitations, planets, phases)
+        numbers = len(bases), bases.index(planets.name) if planets is not None else -1
+        made = _stage(found, stage, record, planets, numbers, back=separates and back_flanks)
         bases.append(f"{stage.name} mesh")
         frequency.append(2.0 * math.pi * model.flow.mesh_frequency[stage.name] / made.excitation.periods)
         staged.append(made)
-    coriolis, centrifugal = _turning_terms(model, chosen if turning else (), assembly, gyroscopic=gyroscopic)
+    coriolis, centrifugal = turning_terms(assembly, carriers.values(), gyroscopic=gyroscopic)
     system = assemble(
         assembly.mass, stiffness + centrifugal, np.zeros((len(T), 0)), load, motions=T, dofs=assembly.free_names
     )
@@ -220,7 +226,7 @@ def _friction_forces(
     found: Deflection, stage: StageModel, made: NonlinearStage, T: np.ndarray, harmonics: int, bases: int
 ) -> Iterator[HarmonicForce]:
     """Friction of a pair about its mean, as with flanks in contact, by motions (6n, m) per unit of the coordinates."""
-    if made.excitation.source is None or stage.planets:
+    if made.excitation.source is None or stage.planets or made.turns:
         return
     columns = np.zeros((len(T), len(made.excitation.source)))
     for column, row in zip(columns.T, rubbing_rows(found, stage)[0], strict=True):
@@ -241,19 +247,14 @@ def _rings(found: Deflection, assembly: Assembly) -> dict[str, tuple[RadialBeari
     return rings
 
 
-def _carrier_speed(model: GearboxModel, stage: StageModel) -> float:
-    """Speed of the carrier of a set [rad/s]; zero of a pair and of one that stands still."""
-    section = stage.section
-    if not isinstance(section, BoxPlanetarySection) or section.carrier == CASING:
-        return 0.0
-    return model.flow.speed[section.carrier]
-
-
-def _structure(found: Deflection, chosen: Sequence[StageModel]) -> tuple[Assembly, np.ndarray, np.ndarray]:
+def _structure(
+    found: Deflection, chosen: Sequence[StageModel], around: Iterable[TurningPlanets]
+) -> tuple[Assembly, np.ndarray, np.ndarray]:
     """Gearbox with its stiffness (6s, 6s) and load (6s,), the meshes of the chosen stages left out.
 
     The load has what nonlinear bearings and meshes carry at the loaded state beyond what their tangents would.
-    Bearings with play are left out; what else a law of them holds stays.
+    Bearings with play are left out; what else a law of them holds stays. Those of planets that go round have the mean
+    of all branches.
     """
     model = found.model
     assembly, _, tangents = linear_system(found)
@@ -265,6 +266,10 @@ def _structure(found: Deflection, chosen: Sequence[StageModel]) -> tuple[Assembl
             stiffness = stiffness - rows[:2].T @ tangent[:2, :2] @ rows[:2]
             force[:2], tangent[:2, :2] = 0.0, 0.0
         load += rows.T @ (tangent @ (rows @ motion) - force)
+    for number, change in (pair for planets in around for pair in pin_changes(found, planets).items()):
+        rows = spread_rows(model.bearings[number], assembly)
+        stiffness = stiffness + rows.T @ change @ rows
+        load += rows.T @ (change @ (rows @ motion))
     gone = {mesh for stage in chosen for mesh in stage.meshes}
     for mesh, part in enumerate(assembly.slices):
         if mesh not in gone:
@@ -274,44 +279,91 @@ def _structure(found: Deflection, chosen: Sequence[StageModel]) -> tuple[Assembl
     return assembly, stiffness, load
 
 
+def _in_time(
+    found: Deflection,
+    stage: StageModel,
+    excitations: Mapping[str, MeshExcitation],
+    planets: TurningPlanets | None,
+    phases: Mapping[str, float],
+) -> MeshExcitation:
+    """Excitation of all meshes of the kinds of a stage as time goes on, with approaches from the unloaded gearbox.
+
+    Of a pair on a carrier that turns those of all its branches.
+    """
+    if planets is None or planets.branches is None:
+        excitation, _, _ = in_time(found.model, stage, excitations[stage.name])
+        excitation = ahead(excitation, phases.get(stage.name, 0.0)) if not stage.planets else excitation
+        contacts, count = [found.contacts.get(stage.name)], max(len(stage.planets), 1)
+    else:
+        kind = next(n for n, names in enumerate(planets.branches.kinds) if stage.name in names)
+        stages = {other.name: other for other in found.model.stages}
+        alike = [stages[name] for name in planets.branches.kinds[kind]]
+        excitation, _, _ = kinds_in_time(found, planets.branches, [alike], kind, excitations, phases)
+        contacts, count = [found.contacts.get(other.name) for other in alike], len(alike)
+    if any(contact is None for contact in contacts):
+        return excitation
+    approach = np.concatenate([contact.approach for contact in contacts if contact is not None])
+    apart = (approach - excitation.deflection.mean(axis=1)).reshape(-1, count).mean(axis=1).repeat(count)
+    return replace(excitation, deflection=excitation.deflection + apart[:, None])
+
+
 def _stage(
-    found: Deflection, stage: StageModel, excitation: MeshExcitation, mesh_base: int, turn: float, *, back: bool
+    found: Deflection,
+    stage: StageModel,
+    excitation: MeshExcitation,
+    planets: TurningPlanets | None,
+    bases: tuple[int, int],
+    *,
+    back: bool,
 ) -> NonlinearStage:
-    """Take a stage with the approaches of its flanks per unit of the coordinates, and its excitation."""
-    model, (assembly, _, tangents) = found.model, linear_system(found)
-    T, kinds = assembly.motions, len(stage.meshes) // max(len(stage.planets), 1)
-    tangents = equal_planets(assembly, stage, tangents)
-    excitation, _, _ = in_time(model, stage, excitation)
-    play = excitation.backlash if np.any(excitation.backlash) else normal_backlash(stage)
-    deflection = excitation.deflection + _mean_approach(found, stage, excitation)[:, None]
-    excitation = replace(excitation, deflection=deflection, backlash=play if back else np.zeros_like(play))
+    """Take a stage with the approaches of its flanks per unit of the coordinates, and its excitation.
+
+    The excitation and directions are made of all meshes of its kinds, of which a pair among branches has its own.
+    ``bases`` are the numbers of the base frequencies of its mesh and of its carrier.
+    """
+    assembly, _, tangents = linear_system(found)
+    meshes, count = stage.meshes, max(len(stage.planets), 1)
+    if planets is not None and planets.branches is not None:
+        meshes = planets.kind_of(stage.meshes[0])
+        count = len(meshes)
+    tangents = equal_planets(assembly, meshes, count, tangents)
+    play = excitation.backlash[: len(stage.meshes)]
+    play = play if np.any(play) else normal_backlash(stage)
     drive, behind, slope, springs = list[np.ndarray](), list[np.ndarray](), list[np.ndarray](), list[np.ndarray]()
     sloping = list[int]()
-    for number, mesh in enumerate(stage.meshes):
+    for number, mesh in enumerate(meshes):
         contact, part = assembly.contacts[mesh], assembly.slices[mesh]
         k, force = tangents[part], found.slice_force[part]
         weight = k / k.sum()
         drive.append(np.einsum("s,gsm->gm", weight, contact.approach))
-        behind.append(np.einsum("s,gsm->gm", weight, _back_approach(contact, _radial(model, stage, number))))
+        behind.append(np.einsum("s,gsm->gm", weight, _back_approach(contact, _radial(found.model, mesh, number))))
         height = contact.heights - weight @ contact.heights
         if float(k @ height**2) > 0.0:
             sloping.append(number)
             effect = contact.approach[:, -1] - contact.approach[:, 0]
             slope.append(effect / (contact.heights[-1] - contact.heights[0]))
             springs.append(np.array([k @ height**2, force @ height, 0.0]))
-    turning = [_directions(model, stage, rows, turns=bool(turn)) for rows in (drive, behind)]
-    sloped = _directions(model, stage, slope, turns=bool(turn), numbers=sloping)
+    at = range(len(meshes))
+    turning = [_directions(assembly, planets, meshes, at, rows) for rows in (drive, behind)]
+    sloped = _directions(assembly, planets, meshes, sloping, slope)
     table = np.array(springs).reshape(-1, 3).T
     table[2] = sloped.at(0.0) @ found.motion
-    if stage.planets and table.size:
+    if count > 1 and table.size:
         # as planets that only the gearbox loads unequally are taken: each as the mean of all
-        table = table.reshape(3, kinds, -1).mean(axis=2, keepdims=True).repeat(len(stage.planets), 2).reshape(3, -1)
+        table = table.reshape(3, -1, count).mean(axis=2).repeat(count, axis=1)
+    own = [number for number, mesh in enumerate(meshes) if mesh in stage.meshes]
+    of_slope = [place for place, number in enumerate(sloping) if number in own]
+    arrays = {name: getattr(excitation, name)[own] for name in ("stiffness", "deflection", "force")}
+    source = excitation.source if len(own) == len(meshes) else None
+    excitation = replace(excitation, **arrays, backlash=play if back else np.zeros_like(play), source=source)
     names = tuple(assembly.contacts[mesh].name for mesh in stage.meshes)
-    parts = [directions.along(T) for directions in (*turning, sloped)]
-    sense = -1 if turn < 0.0 else 1
-    base = mesh_base - 1 if turn else -1
-    springs = table[0], table[1], table[2]
-    return NonlinearStage(stage.name, names, excitation, parts[0], parts[1], parts[2], *springs, mesh_base, base, sense)
+    chosen = ((turning[0], own), (turning[1], own), (sloped, of_slope))
+    parts = [TurningDirections(*(part[of] for part in _parts(rows))).along(assembly.motions) for rows, of in chosen]
+    sense = -1 if planets is not None and planets.speed < 0.0 else 1
+    stiffness, moment, start = table[:, of_slope]
+    return NonlinearStage(
+        stage.name, names, excitation, parts[0], parts[1], parts[2], stiffness, moment, start, *bases, sense
+    )
 
 
 def normal_backlash(stage: StageModel) -> np.ndarray:
@@ -327,18 +379,9 @@ def normal_backlash(stage: StageModel) -> np.ndarray:
     return cosine * np.maximum(play, 0.0)
 
 
-def _mean_approach(found: Deflection, stage: StageModel, excitation: MeshExcitation) -> np.ndarray:
-    """What to add (M,) to the deflections of an excitation that they are those of the contact, on an average [m]."""
-    contact = found.contacts.get(stage.name)
-    if contact is None:
-        return np.zeros(len(stage.meshes))
-    count = max(len(stage.planets), 1)
-    apart = contact.approach - excitation.deflection.mean(axis=1)
-    return apart.reshape(-1, count).mean(axis=1).repeat(count)
-
-
-def _radial(model: GearboxModel, stage: StageModel, number: int) -> np.ndarray:
-    """Direction (3,) from axis to axis of both gears of a mesh."""
+def _radial(model: GearboxModel, mesh: int, number: int) -> np.ndarray:
+    """Direction (3,) from axis to axis of both gears of a mesh, which has this number in its stage."""
+    stage = next(stage for stage in model.stages if mesh in stage.meshes)
     if stage.planets:
         angle = stage.angles[number % len(stage.planets)]
         return np.array([math.cos(angle), math.sin(angle), 0.0])
@@ -365,112 +408,22 @@ def _back_approach(contact: Contact, radial: np.ndarray) -> np.ndarray:
 
 
 def _directions(
-    model: GearboxModel,
-    stage: StageModel,
+    assembly: Assembly,
+    planets: TurningPlanets | None,
+    meshes: Sequence[int],
+    numbers: Sequence[int],
     rows: Sequence[np.ndarray],
-    *,
-    turns: bool,
-    numbers: Sequence[int] | None = None,
 ) -> TurningDirections:
-    """Spread approaches (2, 6) of both gears of meshes over all motions (6s,), as they turn with the carrier.
-
-    ``numbers`` are those of the meshes in the stage, by default all.
-    """
-    numbers = range(len(rows)) if numbers is None else numbers
-    assembly, count = model.assembly, len(stage.planets)
-    parts = np.zeros((3, len(rows), assembly.count))
-    waves = planet_waves(stage.angles) if turns else None
-    for i, (number, row) in enumerate(zip(numbers, rows, strict=True)):
-        for station, effect in zip(assembly.contacts[stage.meshes[number]].stations, row, strict=True):
-            if station == GROUND:
-                continue
-            at = 6 * station + np.arange(6)
-            if waves is None:
-                parts[0, i, at] += effect
-            elif station in stage.planets:
-                parts[:, i] += _of_planet(stage, number % count, effect, waves, assembly.count)
-            else:
-                axis = assembly.places[stage.planets[0]][:2] - stage.sizes.centre_distance * np.array(
-                    [math.cos(stage.angles[0]), math.sin(stage.angles[0])]
-                )
-                beside = np.append(axis - assembly.places[station][:2], 0.0)
-                # the row turns about the axis of the stage
-                there = effect @ rigid_link(-beside)
-                turned = turned_row(there)
-                lateral = -turned_row(turned)
-                for part, value in zip(parts, (there - lateral, lateral, turned), strict=True):
-                    part[i, at] += value @ rigid_link(beside)
-    return TurningDirections(*parts)
-
-
-def _of_planet(stage: StageModel, planet: int, effect: np.ndarray, waves: TurningDirections, count: int) -> np.ndarray:
-    """Approach (3, 6s) by the motions of all planets of a row (6,) of one of them: fixed, even and odd part."""
-    parts = np.zeros((3, count))
-    axes = [np.kron(np.eye(2), pin_axes(psi)) for psi in stage.angles]
-    along = axes[planet] @ effect
-    # pins do not hold rotations, which stay those of the planets
-    waved, rotation = along.copy(), along[5]
-    waved[5] = 0.0
-    for other, station in enumerate(stage.planets):
-        for part, wave in zip(parts, (waves.fixed, waves.even, waves.odd), strict=True):
-            part[6 * station : 6 * station + 6] += wave[planet, other] * waved @ axes[other]
-    parts[0, 6 * stage.planets[planet] + 5] += rotation
-    return parts
-
-
-def _turning_terms(
-    model: GearboxModel, stages: Sequence[StageModel], assembly: Assembly, *, gyroscopic: bool
-) -> tuple[np.ndarray, np.ndarray]:
-    """Gyroscopic and Coriolis terms (6s, 6s) beside the damping, and centrifugal ones beside the stiffness."""
-    velocity = assembly.gyroscopic if gyroscopic else np.zeros((assembly.count, assembly.count))
-    displacement = np.zeros_like(velocity)
-    for stage in stages:
-        if not (speed := _carrier_speed(model, stage)):
-            continue
-        Z = wave_generator(stage, assembly.count)
-        own = replace(assembly, inertias=tuple(one for one in assembly.inertias if one.stations[0] in stage.planets))
-        mass = assembly.mass
-        displacement += speed**2 * Z @ own.mass @ Z + centrifugal_pull(model, stage, own.mass, speed)
-        if gyroscopic:
-            turned = speed * own.gyroscopic @ Z
-            displacement += 0.5 * (turned + turned.T)
-        velocity = velocity + speed * (mass @ Z + Z @ mass)
-    return velocity, displacement
-
-
-def wave_generator(stage: StageModel, count: int) -> np.ndarray:
-    """Compute the rate of change (6s, 6s) of motions of planets and pins by the turn of their carrier at unit speed."""
-    gamma = planet_wave_generator(stage.angles)
-    pins = stage.elastic_carrier.stations[1:] if stage.elastic_carrier else ()
-    Z = np.zeros((count, count))
-    axes = [np.kron(np.eye(2), pin_axes(psi)) for psi in stage.angles]
-    for stations, waved in ((stage.planets, np.diag([1.0, 1.0, 1.0, 1.0, 1.0, 0.0])), (pins, np.eye(6))):
-        for j, first in enumerate(stations):
-            for k, second in enumerate(stations):
-                rate = gamma[j, k] * waved + (_TURNING if j == k else 0.0)
-                Z[6 * first : 6 * first + 6, 6 * second : 6 * second + 6] = axes[j].T @ rate @ axes[k]
-    return Z
-
-
-def centrifugal_pull(model: GearboxModel, stage: StageModel, mass: np.ndarray, speed: float) -> np.ndarray:
-    """Compute the stiffness (6s, 6s) of the pull of the pins on turning planets, which turns with the carrier.
-
-    With the pull ``F = m a speed^2`` and the turn phi of the carrier at the pin it has the energy ``F (phi_z x_t -
-    phi_t x_z) - F a (phi_z^2 + phi_t^2)/2`` of displacements x of the planet, along the axes of the pin.
-    """
-    found = np.zeros_like(mass)
-    arm = stage.sizes.centre_distance
-    for j, (planet, psi) in enumerate(zip(stage.planets, stage.angles, strict=True)):
-        holder = stage.members[1] if stage.elastic_carrier is None else stage.elastic_carrier.stations[1 + j]
-        pull = mass[6 * planet, 6 * planet] * arm * speed**2
-        axes = pin_axes(psi)
-        x, turn = np.zeros((2, 3, len(mass)))
-        x[:, 6 * planet : 6 * planet + 3] = axes
-        turn[:, 6 * holder + 3 : 6 * holder + 6] = axes
-        for first, second, value in ((turn[2], x[1], pull), (turn[1], x[2], -pull)):
-            found += value * (np.outer(first, second) + np.outer(second, first))
-        found -= pull * arm * (np.outer(turn[2], turn[2]) + np.outer(turn[1], turn[1]))
-    return found
+    """Spread approaches (2, 6) of both gears of some of the meshes over all motions (6s,)."""
+    chosen = [meshes[number] for number in numbers]
+    if planets is not None:
+        return turning_rows(assembly, planets, chosen, rows)
+    fixed = np.zeros((len(rows), assembly.count))
+    for approach, mesh, row in zip(fixed, chosen, rows, strict=True):
+        for station, effect in zip(assembly.contacts[mesh].stations, row, strict=True):
+            if station != GROUND:
+                approach[6 * station : 6 * station + 6] += effect
+    return TurningDirections(fixed, np.zeros_like(fixed), np.zeros_like(fixed))
 
 
 def _damping(

@@ -205,6 +205,15 @@ def _deviates(stage: PairSection) -> bool:
     return teeth is not None and common_period(set_deviations(teeth), planetary_set(teeth))[0] > 1
 
 
+def are_unequal(case: GearboxCase, running: RunningSet) -> bool:
+    """Tell whether errors of planets make them unequal."""
+    names = {name for kind in running.kinds for name in kind}
+    planets = {planet for branch in running.branches for planet in branch.planets}
+    return any(shaft.pin_error is not None for shaft in case.shaft if shaft.name in planets) or any(
+        stage.timing_error for stage in case.pair if stage.name in names
+    )
+
+
 def joint_names(case: GearboxCase) -> dict[str, str]:
     """Name what excites a gearbox together, such as all planets with the sun, by the names of its pairs."""
     kinds = [names for running in running_sets(case) for names in running.kinds]

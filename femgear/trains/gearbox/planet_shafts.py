@@ -23,7 +23,7 @@ from femgear.errors import CaseError
 from femgear.findings import Finding
 from femgear.trains.gearbox.case_file import CASING, GearboxCase, PairSection, teeth_of
 from femgear.trains.gearbox.geometry import DISTANCE_TOLERANCE, carriers, pair_sizes
-from femgear.trains.gearbox.planet_branches import ASSEMBLY_TOLERANCE, running_sets
+from femgear.trains.gearbox.planet_branches import ASSEMBLY_TOLERANCE, are_unequal, running_sets
 from femgear.trains.gearbox.power import BoxFlow, gearbox_flow
 
 
@@ -106,18 +106,39 @@ def carrier_entries(case: GearboxCase, stage: PairSection, key: str) -> Iterator
             )
 
 
-def parted_or_in_time(case: GearboxCase) -> Iterator[CaseError]:
-    """Refuse integration in time and teeth that part of pairs on a carrier (E-TURNING)."""
-    if any(stage.carrier is not None for stage in case.pair):
-        for key, there in (("transient", case.transient is not None), ("balance", case.balance.harmonics > 0)):
-            if there:
-                yield CaseError(
-                    "planets that are shafts of their own stand where the case has them",
-                    code="E-TURNING",
-                    key=key,
-                    limit="pairs without a carrier, and [[planetary]] sets",
-                    remedy=f"leave {key} out: statics, modes and response take these planets",
-                )
+def branches_in_balance(case: GearboxCase) -> Iterator[CaseError]:
+    """Refuse a harmonic balance of pairs on a carrier (E-TURNING)."""
+    if case.balance.harmonics > 0 and any(stage.carrier is not None for stage in case.pair):
+        yield CaseError(
+            "meshes of all branches have one frequency, but a harmonic balance excites by one pair at a time",
+            code="E-TURNING",
+            key="balance.harmonics",
+            value=case.balance.harmonics,
+            limit="pairs without a carrier, and [[planetary]] sets",
+            remedy="leave balance out: [transient] has all meshes at once, with teeth that part",
+        )
+
+
+def unlike_in_time(case: GearboxCase, flow: BoxFlow) -> Iterator[CaseError]:
+    """Refuse planets that are shafts whose masses and springs depend on the angle of their carrier (E-TURNING)."""
+    sets = {running.branches[0].carrier: running for running in running_sets(case)}
+    for carrier in turning_carriers(case, flow):
+        running, limit = sets.get(carrier), "equal branches, held by gears and bearings on the carrier alone"
+        fault = "differ, or are held by something beside it"
+        if running is not None:
+            limit = "planets without pin_error, timing_error and clearance"
+            numbers = {number for pins in running.pins for number in pins}
+            gapped = any(case.bearing[number].gapped for number in numbers)
+            fault = "have bearings with play" if gapped else "have errors" if are_unequal(case, running) else ""
+        if fault:
+            yield CaseError(
+                f"planets on {carrier} {fault}: masses and springs depend on the angle of the carrier",
+                code="E-TURNING",
+                key="transient",
+                value=carrier,
+                limit=limit,
+                remedy="make them equal, or write transient.turning = false, which freezes the carrier",
+            )
 
 
 def unclosed_chains(case: GearboxCase, flow: BoxFlow) -> Iterator[CaseError]:

@@ -24,7 +24,7 @@ from femgear.trains.gearbox.deflection import Deflection
 from femgear.trains.gearbox.elastic_ring import ElasticRing
 from femgear.trains.gearbox.model import GearboxModel, StageModel
 from femgear.trains.gearbox.modes import linear_system
-from femgear.trains.gearbox.planet_branches import RunningSet
+from femgear.trains.gearbox.planet_branches import RunningSet, are_unequal
 from femgear.trains.gearbox.stage_structure import (
     Orbit,
     Row,
@@ -103,7 +103,7 @@ def branch_stage(
     model = found.model
     stages = {stage.name: stage for stage in model.stages}
     kinds = [[stages[name] for name in names] for names in running.kinds]
-    stations = [_stations(model, branch.planets) for branch in running.branches]
+    stations = [branch_stations(model, branch.planets) for branch in running.branches]
     gone, meshes = {at for own in stations for at in own}, {s.meshes[0] for names in kinds for s in names}
     modes, motion, inner = structure_modes(found, structure_apart(found, gone, meshes, rings), rings)
     frequencies = [model.flow.mesh_frequency[names[0].name] for names in kinds]
@@ -112,7 +112,7 @@ def branch_stage(
     first = _Branch(found, running, stations[0])
     points, of_mesh = first.meshes([kinds[n] for n in order])
     pins, of_pin = first.pins()
-    excitation, paths, sense = _in_time(found, running, [kinds[n] for n in together], kind, excitations, phases)
+    excitation, paths, sense = kinds_in_time(found, running, [kinds[n] for n in together], kind, excitations, phases)
     mean = excitation.stiffness.mean(axis=1).reshape(len(together), -1).mean(axis=1)
     stiffness = np.array([one.stiffness for one in (*points, *pins)])
     stiffness[: len(together)] = mean
@@ -161,7 +161,7 @@ def branch_stage(
     return StructuredStage(stage, motion, tuple(rows), of_meshes, inner, orbit), forces
 
 
-def _stations(model: GearboxModel, planets: Sequence[str]) -> list[int]:
+def branch_stations(model: GearboxModel, planets: Sequence[str]) -> list[int]:
     """Stations of all planets of a branch."""
     counts = {name: len(model.beams[name].stations) if name in model.beams else 1 for name in planets}
     return [model.first[name] + n for name in planets for n in range(counts[name])]
@@ -262,7 +262,7 @@ class _Branch:
         return np.ix_(numbers, numbers)
 
 
-def _in_time(
+def kinds_in_time(
     found: Deflection,
     running: RunningSet,
     kinds: Sequence[Sequence[StageModel]],
@@ -270,7 +270,7 @@ def _in_time(
     excitations: Mapping[str, MeshExcitation],
     phases: Mapping[str, float],
 ) -> tuple[MeshExcitation, MeshPaths, int]:
-    """Excitation of all kinds of one mesh frequency as time goes on, paths of the branches, and sense of the carrier.
+    """Find the excitation of all kinds of one mesh frequency as time goes on, paths of branches, sense of the carrier.
 
     Kinds beside that of the number vary in stiffness alone. Planets that nothing but the gearbox loads unequally are
     taken as equal, with the mean of all of them.
@@ -290,7 +290,7 @@ def _in_time(
     speed = found.model.flow.speed[running.branches[0].carrier]
     sense = -1 if speed < 0.0 else 1
     paths = MeshPaths(1, running.angles)
-    if _unequal(found, running):
+    if are_unequal(found.model.case, running):
         return excitation, paths, sense
     steps = [phases[row[n].name] - phases[row[0].name] for row in kinds for n in range(len(row))]
     teeth = _teeth(running.angles, np.array(steps), sense)
@@ -298,15 +298,6 @@ def _in_time(
         return excitation, paths, sense
     paths = MeshPaths(teeth, running.angles, 0.0, len(running.angles))
     return mean_excitation(excitation, paths, sense), paths, sense
-
-
-def _unequal(found: Deflection, running: RunningSet) -> bool:
-    """Whether errors of planets make them unequal."""
-    case, names = found.model.case, {name for kind in running.kinds for name in kind}
-    planets = {planet for branch in running.branches for planet in branch.planets}
-    return any(shaft.pin_error is not None for shaft in case.shaft if shaft.name in planets) or any(
-        stage.timing_error for stage in case.pair if stage.name in names
-    )
 
 
 def _teeth(angles: Sequence[float], steps: np.ndarray, sense: int) -> int | None:
@@ -339,7 +330,7 @@ def _record(
     if record is None or record.periods != 1 or record.stiffness.shape[1] != count:
         return MeshExcitation(np.full((1, count), k), nothing, nothing, np.zeros(1))
     turns = flow.speed[section.shafts[0]] - flow.speed[section.carrier]
-    record = _ahead(reversed_in_time(record, back=turns < 0.0), phases[stage.name])
+    record = ahead(reversed_in_time(record, back=turns < 0.0), phases[stage.name])
     if excites:
         return record
     still = {
@@ -349,12 +340,14 @@ def _record(
     return replace(record, **still, source=silent)
 
 
-def _ahead(record: MeshExcitation, phase: float) -> MeshExcitation:
-    """Excitation of a mesh that is ahead by a phase [mesh periods]."""
+def ahead(record: MeshExcitation, phase: float) -> MeshExcitation:
+    """Move an excitation ahead by a phase [mesh periods]."""
+    if not phase:
+        return record
     arrays = {}
     for name in ("stiffness", "deflection", "force", "source"):
         if (values := getattr(record, name)) is not None:
             lines = np.fft.rfft(values, axis=1)
-            turned = lines * np.exp(2j * math.pi * phase * np.arange(lines.shape[1]))
+            turned = lines * np.exp(2j * math.pi * phase / record.periods * np.arange(lines.shape[1]))
             arrays[name] = np.fft.irfft(turned, values.shape[1], axis=1)
     return replace(record, **arrays)

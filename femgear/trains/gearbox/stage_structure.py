@@ -347,7 +347,7 @@ def _mesh_rows(found: Deflection, stage: StageModel) -> tuple[list[Row], np.ndar
     that has slices. The former is that of all slices by their stiffness. Axes of the planet are radial, tangential, z.
     """
     assembly, _, tangents = linear_system(found)
-    stiffness = equal_planets(assembly, stage, tangents)
+    stiffness = equal_planets(assembly, stage.meshes, max(len(stage.planets), 1), tangents)
     count = max(len(stage.planets), 1)
     approach, slope = [], []
     axes = np.kron(np.eye(2), pin_axes(stage.angles[0])) if stage.planets else np.eye(6)
@@ -390,7 +390,7 @@ def rubbing_rows(found: Deflection, stage: StageModel) -> tuple[list[Row], np.nd
     slices by their stiffness.
     """
     assembly, _, tangents = linear_system(found)
-    stiffness = equal_planets(assembly, stage, tangents)
+    stiffness = equal_planets(assembly, stage.meshes, max(len(stage.planets), 1), tangents)
     axes = np.kron(np.eye(2), pin_axes(stage.angles[0])) if stage.planets else np.eye(6)
     rows, of_planet = list[Row](), list[np.ndarray]()
     for kind in (0, 1):
@@ -403,14 +403,14 @@ def rubbing_rows(found: Deflection, stage: StageModel) -> tuple[list[Row], np.nd
     return rows, np.array(of_planet)
 
 
-def equal_planets(assembly: Assembly, stage: StageModel, stiffness: np.ndarray) -> np.ndarray:
-    """Give every slice (g,) of a set the mean of the planets [N/m], one after the other of which stands there.
+def equal_planets(assembly: Assembly, meshes: Sequence[int], planets: int, stiffness: np.ndarray) -> np.ndarray:
+    """Give every slice (g,) of meshes, kind by kind, the mean of the planets [N/m], one after the other stands there.
 
     Where planets stand, some slices may carry nothing, as weight and bending shafts have it.
     """
     averaged = stiffness.copy()
-    for meshes in np.reshape(stage.meshes, (-1, max(len(stage.planets), 1))):
-        slices = [assembly.slices[mesh] for mesh in meshes]
+    for alike in np.reshape(meshes, (-1, planets)):
+        slices = [assembly.slices[mesh] for mesh in alike]
         mean = np.mean([stiffness[part] for part in slices], axis=0)
         for part in slices:
             averaged[part] = mean

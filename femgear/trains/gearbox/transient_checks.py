@@ -22,6 +22,8 @@ from femgear.system.turning_meshes import planet_wave_generator
 from femgear.trains.gearbox.case_file import CASING, BoxPlanetarySection, GearboxCase
 from femgear.trains.gearbox.geometry import set_sizes
 from femgear.trains.gearbox.model import GearboxModel, gearbox_model
+from femgear.trains.gearbox.planet_branches import running_sets
+from femgear.trains.gearbox.planet_shafts import unlike_in_time
 from femgear.trains.gearbox.power import gearbox_flow
 from femgear.trains.gearbox.transient_case import (
     FASTEST_RATE,
@@ -216,14 +218,26 @@ def refusals_located(case: GearboxCase) -> Iterator[None]:
 def _check_turning_planets(case: GearboxCase) -> None:
     assert case.transient is not None
     flow = gearbox_flow(case)
-    for number, stage in enumerate(case.planetary if case.transient.turning else ()):
-        if stage.carrier != CASING and flow.speed[stage.carrier]:
-            try:
-                planet_wave_generator(set_sizes(stage).planet_angles)
-            except CaseError as error:
-                error.key = f"planetary[{number}]"
-                error.remedy = f"{error.remedy}, or write transient.turning = false, which freezes the carrier"
-                raise
+    if not case.transient.turning:
+        return
+    for problem in unlike_in_time(case, flow):
+        raise problem
+    around = [
+        (f"planetary[{number}]", set_sizes(stage).planet_angles)
+        for number, stage in enumerate(case.planetary)
+        if stage.carrier != CASING and flow.speed[stage.carrier]
+    ]
+    for running in running_sets(case):
+        carrier = running.branches[0].carrier
+        if flow.speed[carrier]:
+            around.append(("transient", running.angles))
+    for key, angles in around:
+        try:
+            planet_wave_generator(angles)
+        except CaseError as error:
+            error.key = key
+            error.remedy = f"{error.remedy}, or write transient.turning = false, which freezes the carrier"
+            raise
 
 
 def check_spectrum(case: GearboxCase) -> None:

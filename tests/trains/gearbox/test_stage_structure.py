@@ -131,7 +131,7 @@ def test_planets_whose_slices_are_pressed_unequally_count_with_their_mean():
     stage, (assembly, _, stiffness) = found.model.stages[0], linear_system(found)
     first = assembly.slices[stage.meshes[0]]
     stiffness[first.start] = 0.0
-    mean = equal_planets(assembly, stage, stiffness)
+    mean = equal_planets(assembly, stage.meshes, len(stage.planets), stiffness)
     assert mean[first.start] == pytest.approx(2.0 / 3.0 * stiffness[first.start + 1], rel=1e-12)
     of_planets = [mean[assembly.slices[mesh]] for mesh in stage.meshes[:3]]
     assert all(np.array_equal(values, of_planets[0]) for values in of_planets)
