@@ -160,7 +160,7 @@ def dynamic_model(case: Any, *, progress: Progress = silent) -> DynamicModel:
     Parameters
     ----------
     case : Case
-        A planetary set or a pair.
+        A planetary set, a pair, or a gearbox whose planets do not run around.
     progress : callable
         Called with (stage, done, total).
 
@@ -170,14 +170,15 @@ def dynamic_model(case: Any, *, progress: Progress = silent) -> DynamicModel:
         A kind of case without such a model, or without speeds (E-MODEL).
     """
     make = train_of(case).dynamic_model
-    if make is None or not case.operation.speeds:
+    if make is None or not getattr(case.operation, "speeds", True):
         raise CaseError(
             "this case has no linear model for other programs" if make is None else "a model needs a speed",
             code="E-MODEL",
             value=train_of(case).words,
-            limit="planetary sets and pairs, with operation.speeds",
+            limit="planetary sets, pairs and gearboxes, with operation.speeds",
             remedy="give operation.speeds" if make else "take a case of one of its stages",
         )
+    train_of(case).check_model(case)
     return make(case, solve(case, "modes", progress=progress))
 
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import importlib.util
 import shutil
+from itertools import product
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -16,11 +17,14 @@ import numpy as np
 
 from femgear.exchange.dynamic_model import DynamicModel
 from femgear.exchange.fmu import write_fmu
-from femgear.run import solve
+from femgear.run import dynamic_model, solve
 from femgear.solvers.linear.state_space import state_space
+from femgear.solvers.periodic.harmonic_balance import solve_harmonic_balance
 from femgear.solvers.periodic.spectral import solve_spectral
 from femgear.system.fourier import sample
 from femgear.trains.elastic.outputs import lines_of_field, mesh_and_ring_outputs
+from femgear.trains.gearbox.nonlinear import nonlinear_gearbox
+from femgear.trains.gearbox.transient import all_excitations
 from femgear.trains.reading import read_case, with_values
 from femgear.trains.registry import train_of
 from validation.rows import Row, at_most, information
@@ -31,6 +35,7 @@ INSTANTS, RESPONSE = 64, 80
 """Instants of the period that are compared, and harmonics of the reference."""
 SPECTRAL = "Spectral solver with the same harmonics of the excitation."
 BALANCE = "Harmonic balance with play, 120 harmonics."
+BOTH_FREQUENCIES = "Harmonic balance of the whole gearbox with both mesh frequencies, without modes."
 CASES = Path(__file__).parents[1] / "cases"
 _START_FORGOTTEN = 20.0
 """Decay of the slowest mode until the compared period, as exponent."""
@@ -41,6 +46,40 @@ _OF_PAIR = ["deflection_of_gear_1_gear_2", "force_of_gear_1_gear_2"]
 _HELICAL = {"helical.slices": 5, "operation.speeds": ["2500 rpm"], "sun.support_stiffness": "1e7 N/m"}
 _SET = {"dynamics.damping_ratio": 0.1, "static.stresses": False, "housing.published": None}
 
+
+_TWO_STAGES = {
+    "model": "gearbox",
+    "title": "two pairs in series",
+    "motions": "rotation",
+    "shaft": [
+        {"name": name, "axis": [f"{place} mm", "0 mm"], "part": [{"length": "90 mm", "outer_diameter": f"{size} mm"}]}
+        for name, place, size in (("input", 0, 30), ("middle", 90, 40), ("output", 190, 50))
+    ],
+    "pair": [
+        {
+            "name": name,
+            "shafts": shafts,
+            "positions": [place, place],
+            "gears": {"teeth": teeth, "module": module, "face_width": "20 mm"},
+            "mesh": {"stiffness": stiffness, "contact_ratio": ratio},
+        }
+        for name, shafts, place, teeth, module, stiffness, ratio in (
+            ("first", ["input", "middle"], "30 mm", [24, 36], "3 mm", "4e8 N/m", 1.6),
+            ("second", ["middle", "output"], "60 mm", [20, 30], "4 mm", "5e8 N/m", 1.7),
+        )
+    ],
+    "load": [
+        {"name": "motor", "shaft": "input", "position": "0 mm"},
+        {"name": "brake", "shaft": "output", "position": "90 mm"},
+    ],
+    "modes": {"damping_ratio": 0.05, "up_to": "1e6 Hz"},
+    "operation": {
+        "output": ["brake"],
+        "load_case": [{"torque": {"motor": "100 N m"}, "speed": {"input": "3000 rpm"}}],
+    },
+}
+_ORDERS = 24
+"""Multiples of both mesh frequencies together, at most."""
 
 _MISSING = (
     information("FMU", "FMPy.", "units: not computed", None, float("nan"), note="needs the library fmpy, and cc"),
@@ -153,6 +192,29 @@ def sets() -> tuple[Row, ...]:
     apart = float(np.abs(found["sensor"] - expected).max() / np.abs(expected).max())
     text = "displacement at the sensor by the FMU, largest difference [1]"
     rows.append(at_most("27/40/108", "Lines of the fixed sensor.", text, GATE, apart))
+    return tuple(rows)
+
+
+def gearboxes() -> tuple[Row, ...]:
+    """A gearbox of two pairs whose stiffness varies at once, with all of its modes."""
+    if not _installed():
+        return _MISSING
+    case = read_case(_TWO_STAGES)
+    found, model = solve(case, "deflection")["deflection"].of(case).state, dynamic_model(case)
+    known = {"separates": False, "back_flanks": False, "gyroscopic": False, "turning": False}
+    box = nonlinear_gearbox(found, all_excitations(found), harmonics=3, **known)
+    lines = [line for line in product(range(-_ORDERS, _ORDERS + 1), repeat=2) if line >= (0, 0)]
+    orders = np.array([line for line in lines if abs(line[0]) + abs(line[1]) <= _ORDERS])
+    orders = orders[np.argsort(orders.any(axis=1), kind="stable")]
+    balance = solve_harmonic_balance(box.problem, box.frequency, orders=orders, stability=False, radius=False)
+    names, rows = ["deflection_of_first", "deflection_of_second"], list[Row]()
+    motion = last_period(model, model.speed, 3, names)
+    wave = np.exp(1j * np.outer(orders @ box.frequency, motion["time"]))
+    for name, line in zip(names, balance.deflection, strict=True):
+        expected = np.real(line @ wave)
+        apart = float(np.abs(motion[name] - expected).max() / np.abs(expected).max())
+        text = f"{name.replace('_', ' ')} by the FMU, largest difference [1]"
+        rows.append(at_most("gearbox of two pairs", BOTH_FREQUENCIES, text, GATE, apart))
     return tuple(rows)
 
 

@@ -748,7 +748,7 @@ THEMES = (
         "need the library fmpy and a C compiler. Compared with: the spectral solver, harmonic balance, lines of the "
         "sensor, modes; gates: 1e-6 of the largest value in the period; 1e-9.",
         (other_programs.matrices,),
-        (other_programs.pairs, other_programs.rubbing, other_programs.sets),
+        (other_programs.pairs, other_programs.rubbing, other_programs.sets, other_programs.gearboxes),
     ),
     Theme(
         "fixed_housing",

@@ -73,6 +73,9 @@ class DynamicModel:
     separates : bool
         Whether the model of the train lets flanks part.
     sensor : RingSensor, optional
+    mesh_ratio, mesh_ahead : (M,) arrays, optional
+        Mesh periods of every mesh over those of the first one, by default 1, and by how many of its own periods a mesh
+        is ahead of these, by default none.
     """
 
     title: str
@@ -83,6 +86,15 @@ class DynamicModel:
     driver: int
     separates: bool = False
     sensor: RingSensor | None = None
+    mesh_ratio: np.ndarray | None = None
+    mesh_ahead: np.ndarray | None = None
+
+    @property
+    def phases(self) -> tuple[np.ndarray, np.ndarray]:
+        """Ratio and lead (M,) of every mesh, see `mesh_ratio` and `mesh_ahead`."""
+        count = len(self.modal.meshes)
+        ratio = np.ones(count) if self.mesh_ratio is None else self.mesh_ratio
+        return ratio, np.zeros(count) if self.mesh_ahead is None else self.mesh_ahead
 
     @property
     def ratios(self) -> np.ndarray:
@@ -145,6 +157,7 @@ def write_state_space(model: DynamicModel, path: Path, *, harmonics: int = HARMO
     arrays |= {"state_unit": space.state_units, "input_unit": space.input_units, "output_unit": space.output_units}
     arrays |= {"nominal": space.nominal, "mesh": modal.meshes, "mesh_stiffness": modal.mesh_stiffness}
     arrays |= {"phase": tables.phase, "angle": tables.phase / model.mesh_rate, "stiffness": tables.stiffness}
+    arrays |= dict(zip(("mesh_ratio", "mesh_ahead"), model.phases, strict=True))
     arrays |= {"deflection": tables.deflection, "force": tables.force, "friction": tables.friction}
     arrays |= {"backlash": model.excitation.backlash, "natural_frequency": modal.omega / (2.0 * np.pi)}
     arrays |= {"damping_ratio": modal.damping_ratio, "speed": model.speed, "mesh_rate": model.mesh_rate}

@@ -39,6 +39,7 @@ _SECONDS = 300
 """Longest that a compiler may take [s]."""
 _EXPONENTS = ("kg", "m", "s", "rad")
 _UNITS = {"N": (1, 1, -2, 0), "m": (0, 1, 0, 0), "N m": (1, 2, -2, 0), "rad": (0, 0, 0, 1), "rad/s": (0, 0, -1, 1)}
+_UNITS |= {"m/s^2": (0, 1, -2, 0)}
 """Exponents of base units."""
 
 
@@ -86,12 +87,12 @@ def unit_variables(model: DynamicModel) -> Iterator[UnitVariable]:
     """List the variables of the unit of a train, in the order of their value references."""
     modal = model.modal
     yield UnitVariable("damping_factor", "parameter", "", "factor on the damping ratios of all modes", 1.0)
-    yield UnitVariable("start_phase", "parameter", "", "phase of the mesh at the beginning, in mesh periods", 0.0)
+    yield UnitVariable("start_phase", "parameter", "", "phase of the first mesh at the beginning, in mesh periods", 0.0)
     yield UnitVariable("tolerance", "parameter", "", "relative error of a step of the integration", TOLERANCE)
     yield UnitVariable("speed", "input", "rad/s", "speed of the input but for what torques accelerate", model.speed)
     for port in modal.inputs[: _loads(model)]:
         yield UnitVariable(identifier(port.name), "input", port.unit, port.name, port.nominal)
-    yield UnitVariable("mesh_phase", "output", "", "mesh periods since the phase 0")
+    yield UnitVariable("mesh_phase", "output", "", "mesh periods of the first mesh since the phase 0")
     for word, unit in (("deflection", "m"), ("force", "N")):
         for mesh in modal.meshes:
             yield UnitVariable(
@@ -103,6 +104,9 @@ def unit_variables(model: DynamicModel) -> Iterator[UnitVariable]:
     for number in modal.rotations:
         name = f"{modal.outputs[number].name} rate"
         yield UnitVariable(identifier(name), "output", "rad/s", f"{name}, with its mean")
+    for number in modal.accelerations:
+        name = f"{modal.outputs[number].name} acceleration"
+        yield UnitVariable(identifier(name), "output", "m/s^2", name)
     if model.sensor is not None:
         yield UnitVariable("sensor", "output", "m", "radial displacement at the sensor on the ring")
 
@@ -129,6 +133,7 @@ def _data(model: DynamicModel, tables: MeshTables, variables: Iterable[UnitVaria
     rigid = int(np.count_nonzero(modal.omega == 0.0))
     sizes: dict[str, float] = {"MODES": len(modal.omega), "RIGID": rigid, "MESHES": len(modal.meshes)}
     sizes |= {"INPUTS": len(modal.inputs), "LOAD_COUNT": loads, "OUTPUTS": len(modal.outputs), "SHOWN": _shown(model)}
+    sizes |= {"ACCELERATIONS": len(modal.accelerations)}
     sizes |= {"ROTATIONS": len(modal.rotations), "POSITIONS": len(tables.phase), "PERIODS": model.excitation.periods}
     sizes |= {"MESH_RATE": model.mesh_rate, "SEPARATES": int(model.separates)}
     sizes |= {"SENSORS": int(sensor is not None), "DIAMETERS": 0, "SENSOR_ANGLE": 0.0, "CARRIER": 0.0}
@@ -139,10 +144,12 @@ def _data(model: DynamicModel, tables: MeshTables, variables: Iterable[UnitVaria
     arrays |= {"mesh_by_input": modal.mesh_by_input, "input_rows": modal.input_rows}
     arrays |= {"output_rows": modal.output_rows, "output_by_mesh": modal.output_by_mesh}
     arrays |= {"output_by_input": modal.output_by_input, "ratio": model.ratios, "backlash": model.excitation.backlash}
+    arrays |= dict(zip(("mesh_ratio", "mesh_ahead"), model.phases, strict=True))
     arrays |= {"driver_row": modal.output_rows[model.driver, :rigid], "stiffness_table": tables.stiffness}
     arrays |= {"deflection_table": tables.deflection, "force_table": tables.force, "friction_table": tables.friction}
     lines = [f"#define {name} ({value!r})" for name, value in sizes.items()]
     lines += ["static const int turns[] = {" + ",".join(str(int(c.unit == "rad")) for c in modal.outputs) + "};"]
+    lines += ["static const int shakes[] = {" + ",".join(str(int(c.accelerates)) for c in modal.outputs) + "};"]
     return "\n".join([*lines, *(_array(name, values) for name, values in arrays.items()), ""])
 
 

@@ -5,7 +5,8 @@
      eta'' + 2 zeta omega eta' + omega^2 eta = input_rows^T u - mesh_rows^T g
      x = mesh_rows eta - mesh_residual g + mesh_by_input u,   g = f(x, phase) - mesh_stiffness x
 
-   with the force f = force + stiffness (x - deflection) of every mesh, whose tables run with the phase. Flanks that may
+   with the force f = force + stiffness (x - deflection) of every mesh, whose tables run with its phase. That is so many
+   times the phase of the first mesh as its ratio says, and ahead of it by a constant. Flanks that may
    part have max(f, 0), and beyond the backlash the same with the other sign. Steps are those of Dormand and Prince, J.
    Comput. Appl. Math. 6, 1980, 19-26, of order 5 with an error estimate of order 4. */
 
@@ -60,7 +61,8 @@ enum { DAMPING, START, TOLERANCE, SPEED, LOADS };
 #define FORCES (DEFLECTIONS + MESHES)
 #define SEEN (FORCES + MESHES)
 #define RATES (SEEN + SHOWN)
-#define SENSOR (RATES + ROTATIONS)
+#define SHAKEN (RATES + ROTATIONS)
+#define SENSOR (SHAKEN + ACCELERATIONS)
 #define VARIABLES (SENSOR + SENSORS)
 
 typedef struct {
@@ -92,7 +94,10 @@ static double turned(const double *y) {
   return y[0] + sum;
 }
 
+/* mesh periods of the first mesh */
 static double phase_of(const State *s, const double *y) { return s->set[START] + MESH_RATE * turned(y); }
+
+static double phase_of_mesh(int mesh, double phase) { return mesh_ratio[mesh] * phase + mesh_ahead[mesh]; }
 
 /* weights of the four points around a phase, and the first of these */
 static int weights(double phase, double *w) {
@@ -156,10 +161,12 @@ static int eliminate(double a[MESHES][MESHES], double *b) {
 /* inputs u, deflections x, forces f and what they have beyond the mean stiffness g; 0 where there is no solution */
 static int meshes(const State *s, const double *y, double *u, double *x, double *f, double *g) {
   double w[4], k[MESHES], d[MESHES], load[MESHES], free[MESHES], slope[MESHES], a[MESHES][MESHES], b[MESHES], change, size;
-  int i, j, c, round, first = weights(phase_of(s, y), w);
+  double phase = phase_of(s, y);
+  int i, j, c, round, first = weights(phase, w);
   for (c = 0; c < LOAD_COUNT; c++) u[c] = s->set[LOADS + c];
   for (c = LOAD_COUNT; c < INPUTS; c++) u[c] = between(friction_table[c - LOAD_COUNT], first, w);
   for (j = 0; j < MESHES; j++) {
+    first = weights(phase_of_mesh(j, phase), w);
     k[j] = between(stiffness_table[j], first, w);
     d[j] = between(deflection_table[j], first, w);
     load[j] = between(force_table[j], first, w);
@@ -189,17 +196,23 @@ static int meshes(const State *s, const double *y, double *u, double *x, double 
   return change <= 1e-9 * size;
 }
 
+/* acceleration of a mode by the inputs u and the mesh forces g */
+static double modal_acceleration(const State *s, const double *y, const double *u, const double *g, int i) {
+  double sum = -omega[i] * (omega[i] * y[1 + i] + 2.0 * s->set[DAMPING] * zeta[i] * y[1 + MODES + i]);
+  int j, c;
+  for (j = 0; j < MESHES; j++) sum -= mesh_rows[j][i] * g[j];
+  for (c = 0; c < INPUTS; c++) sum += input_rows[c][i] * u[c];
+  return sum;
+}
+
 static int rates(const State *s, const double *y, double *dy) {
-  double u[INPUTS + 1], x[MESHES], f[MESHES], g[MESHES], sum;
-  int i, j, c;
+  double u[INPUTS + 1], x[MESHES], f[MESHES], g[MESHES];
+  int i;
   if (!meshes(s, y, u, x, f, g)) return 0;
   dy[0] = s->set[SPEED];
   for (i = 0; i < MODES; i++) {
-    sum = -omega[i] * (omega[i] * y[1 + i] + 2.0 * s->set[DAMPING] * zeta[i] * y[1 + MODES + i]);
-    for (j = 0; j < MESHES; j++) sum -= mesh_rows[j][i] * g[j];
-    for (c = 0; c < INPUTS; c++) sum += input_rows[c][i] * u[c];
     dy[1 + i] = y[1 + MODES + i];
-    dy[1 + MODES + i] = sum;
+    dy[1 + MODES + i] = modal_acceleration(s, y, u, g, i);
   }
   return 1;
 }
@@ -269,8 +282,10 @@ static void rest(State *s) {
   first = weights(phase_of(s, s->y), w);
   for (c = 0; c < LOAD_COUNT; c++) u[c] = s->set[LOADS + c];
   for (c = LOAD_COUNT; c < INPUTS; c++) u[c] = between(friction_table[c - LOAD_COUNT], first, w);
-  for (j = 0; j < MESHES; j++)
+  for (j = 0; j < MESHES; j++) {
+    first = weights(phase_of_mesh(j, phase_of(s, s->y)), w);
     g[j] = between(force_table[j], first, w) - mesh_stiffness[j] * between(deflection_table[j], first, w);
+  }
   for (i = RIGID; i < MODES; i++) {
     sum = 0.0;
     for (j = 0; j < MESHES; j++) sum -= mesh_rows[j][i] * g[j];
@@ -282,7 +297,7 @@ static void rest(State *s) {
 
 static int observe(State *s) {
   double u[INPUTS + 1], x[MESHES], f[MESHES], g[MESHES], seen[OUTPUTS], sum;
-  int i, j, c, p, n, rotation = 0;
+  int i, j, c, p, n, rotation = 0, shaken = 0;
   if (s->known) return 1;
   if (!meshes(s, s->y, u, x, f, g)) return 0;
   memcpy(s->value, s->set, sizeof s->set);
@@ -295,6 +310,11 @@ static int observe(State *s) {
     for (c = 0; c < INPUTS; c++) sum += output_by_input[p][c] * u[c];
     seen[p] = sum;
     if (p < SHOWN) s->value[SEEN + p] = sum;
+    if (shakes[p]) {
+      sum = 0.0;
+      for (i = 0; i < MODES; i++) sum += output_rows[p][i] * modal_acceleration(s, s->y, u, g, i);
+      s->value[SHAKEN + shaken++] = sum;
+    }
     if (!turns[p]) continue;
     s->value[SEEN + p] += ratio[p] * s->y[0];
     sum = ratio[p] * s->set[SPEED];

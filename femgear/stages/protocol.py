@@ -362,6 +362,8 @@ class Train:
         Stages of other trains, with the stage of this one that has their results.
     duty : callable
         ``(case) -> sentence`` that says what the train does, empty of trains without a power flow.
+    check_model : callable
+        ``(case)``: refuses a case that has no model for other programs (E-MODEL), before anything is computed for it.
     """
 
     name: str
@@ -383,6 +385,7 @@ class Train:
     heard: Callable[[Any], Mapping[str, HeardSet]] | None = None
     stands_in: Mapping[str, str] = field(default_factory=dict)
     duty: Callable[[Any], str] = lambda case: ""
+    check_model: Callable[[Any], None] = lambda case: None
 
     def stage(self, name: str) -> Stage | None:
         """Find the stage of a name, None where the train has none of it."""

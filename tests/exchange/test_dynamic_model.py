@@ -23,7 +23,8 @@ from femgear.system.fourier import sample
 
 ARRAYS = (
     "A B C D state input output state_unit input_unit output_unit nominal mesh mesh_stiffness phase angle stiffness "
-    "deflection force friction backlash natural_frequency damping_ratio speed mesh_rate title"
+    "deflection force friction backlash natural_frequency damping_ratio speed mesh_rate title "
+    "mesh_ratio mesh_ahead"
 ).split()
 
 

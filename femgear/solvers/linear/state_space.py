@@ -33,12 +33,15 @@ class Port:
         Of an input the load on every coordinate per unit of it; of an output its value per unit of every coordinate.
     nominal : float
         Value of an input about which the system is linear.
+    accelerates : bool
+        Of an output in the unit "m": whether its acceleration is an output, too.
     """
 
     name: str
     unit: str
     direction: np.ndarray
     nominal: float = 0.0
+    accelerates: bool = False
 
     def __post_init__(self):
         freeze(self)
@@ -99,6 +102,11 @@ class ModalModel:
     def rotations(self) -> np.ndarray:
         """Numbers of the outputs that are rotations."""
         return np.flatnonzero([port.unit == "rad" for port in self.outputs])
+
+    @property
+    def accelerations(self) -> np.ndarray:
+        """Numbers of the outputs whose accelerations are outputs, too."""
+        return np.flatnonzero([port.accelerates for port in self.outputs])
 
 
 @dataclass(frozen=True)
@@ -218,8 +226,8 @@ def _friction(system: MechanicalSystem, meshes: Sequence[str]) -> list[Port]:
 def state_space(model: ModalModel) -> StateSpace:
     """Make the matrices of a model, whose inputs are displacements of flanks, then those of the model.
 
-    Outputs are deflections [m] and forces [N] of the meshes, the outputs of the model, and the rates of its rotations,
-    as far as the modes have them.
+    Outputs are deflections [m] and forces [N] of the meshes, the outputs of the model, the rates of its rotations, and
+    accelerations of those that have one. Rates and accelerations are those of the modes, without what these leave out.
     """
     m, k, turning = len(model.omega), model.mesh_stiffness, model.rotations
     nothing, flanks = np.zeros((m, m)), model.mesh_rows.T * k
@@ -231,11 +239,13 @@ def state_space(model: ModalModel) -> StateSpace:
     force[:, : len(k)] -= np.diag(k)
     # g = - k_m e
     seen = np.hstack([model.output_by_mesh * k, model.output_by_input])
-    rates = model.output_rows[turning]
+    rates, shaken = model.output_rows[turning], model.output_rows[model.accelerations]
     modal = np.vstack([model.mesh_rows, k[:, None] * model.mesh_rows, model.output_rows, np.zeros_like(rates)])
     speeds = np.vstack([np.zeros((len(modal) - len(rates), m)), rates])
-    D = np.vstack([deflection, force, seen, np.zeros((len(rates), seen.shape[1]))])
+    modal, speeds = np.vstack([modal, shaken @ A[m:, :m]]), np.vstack([speeds, shaken @ A[m:, m:]])
+    D = np.vstack([deflection, force, seen, np.zeros((len(rates), seen.shape[1])), shaken @ loads])
     rotating = [model.outputs[number] for number in turning]
+    shaking = [model.outputs[number] for number in model.accelerations]
     return StateSpace(
         A=A,
         B=B,
@@ -247,11 +257,16 @@ def state_space(model: ModalModel) -> StateSpace:
             *(f"{word} of {mesh}" for word in ("deflection", "force") for mesh in model.meshes),
             *(port.name for port in model.outputs),
             *(f"{port.name} rate" for port in rotating),
+            *(f"{port.name} acceleration" for port in shaking),
         ),
         state_units=("m kg^1/2",) * m + ("m kg^1/2/s",) * m,
         input_units=("m",) * len(k) + tuple(port.unit for port in model.inputs),
         output_units=(
-            ("m",) * len(k) + ("N",) * len(k) + tuple(port.unit for port in model.outputs) + ("rad/s",) * len(rotating)
+            *("m",) * len(k),
+            *("N",) * len(k),
+            *(port.unit for port in model.outputs),
+            *("rad/s",) * len(rotating),
+            *("m/s^2",) * len(shaking),
         ),
         nominal=np.concatenate([np.zeros(len(k)), model.nominal]),
     )

@@ -168,7 +168,8 @@ def solve_gearbox_modes(found: Deflection, *, steps: Steps | None = None) -> Gea
     carriers = [carrier.below(math.inf if top is None else _REACH * top) for carrier in carriers]
     system = with_carriers(system, assembly, carriers)
     still = replace(system, gyroscopic=None, load=np.zeros(len(system.dofs)))
-    modes = undamped_modes(still, stiffness, damping_ratio=case.modes.damping_ratio, count=_kept(still, stiffness, top))
+    kept = count_modes(still, stiffness, top)
+    modes = undamped_modes(still, stiffness, damping_ratio=case.modes.damping_ratio, count=kept)
     count = assembly.motions.shape[1]
     motion, waves = assembly.motions @ modes.shape[:count], modes.shape[count:]
     squares = {ring.name: ring.stiffness for ring in rings} | {one.name: one.frequency**2 for one in carriers}
@@ -246,8 +247,8 @@ def _in_modes(still: MechanicalSystem, stiffness, gyroscopic, speed: float, coun
     )
 
 
-def _kept(system: MechanicalSystem, stiffness: np.ndarray, top: float | None) -> int:
-    """Number of modes up to a frequency [Hz], `_LEAST` or more; all without one."""
+def count_modes(system: MechanicalSystem, stiffness: np.ndarray, top: float | None) -> int:
+    """Count modes up to a frequency [Hz], `_LEAST` or more; all without one."""
     if top is None:
         return len(system.dofs)
     whole = undamped_modes(system, stiffness, damping_ratio=0.0)

@@ -27,6 +27,7 @@ from femgear.trains.gearbox.case_file import GearboxCase, LoadCaseSection, teeth
 from femgear.trains.gearbox.casing_draft import draft_casing
 from femgear.trains.gearbox.casing_file import check_casing_file, describe_casing
 from femgear.trains.gearbox.deflection import Deflection, check_held, solve_deflection
+from femgear.trains.gearbox.dynamic_model import check_dynamic_model, gearbox_dynamic_model
 from femgear.trains.gearbox.friction import box_friction_findings, friction_excites
 from femgear.trains.gearbox.judgements import gearbox_judgements
 from femgear.trains.gearbox.key_figures import gearbox_key_figures
@@ -368,6 +369,8 @@ GEARBOX = Train(
     ),
     bodies=lambda case: gearbox_bodies(case, {}),
     draft_casing=draft_casing,
+    dynamic_model=gearbox_dynamic_model,
+    check_model=check_dynamic_model,
     heard=heard_stages,
     stands_in={"static": "deflection", "life": "deflection", "housing": "dynamics"},
     judgements=gearbox_judgements,
