@@ -172,7 +172,7 @@ class Candidates:
         others = window_cracks(self.setup, bodies, *self._places) if self.cracks else ()
         for crack, other in zip(self.cracks, others, strict=True):
             if other.flanks is not crack.flanks:
-                images[0] += replace(other, closed=crack.closed).yielding() - crack.yielding()
+                crack.soften(images[0], replace(other, closed=crack.closed).yielding() - crack.yielding())
         return images
 
     @property
@@ -185,8 +185,20 @@ class Candidates:
         images, cracks = self.images.copy(), []
         for crack, pairs in zip(self.cracks, closed, strict=True):
             cracks.append(replace(crack, closed=pairs))
-            images[0] += cracks[-1].yielding() - crack.yielding()
+            rows = np.flatnonzero((pairs != crack.closed).any(axis=1))
+            before, after = (at.at(rows).yielding() for at in (crack, cracks[-1]))
+            there = images[0, rows]
+            crack.soften(there, after - before)
+            images[0, rows] = there
         return replace(self, images=images, cracks=tuple(cracks))
+
+    def at(self, rows: np.ndarray) -> Candidates:
+        """Take some of the positions, by their places (n,) among these."""
+        names = ("position", "pair", "gap", "candidate", "polynomials", "local")
+        of_rows = {name: getattr(self, name)[rows] for name in names}
+        friction = None if self.friction is None else self.friction.at(rows)
+        cracks = tuple(crack.at(rows) for crack in self.cracks)
+        return replace(self, **of_rows, images=self.images[:, rows], friction=friction, cracks=cracks)
 
     def touches_window_end(self, active: np.ndarray) -> bool:
         """Whether a contact (P, W, C) ends where its window ends, other than at an end of a flank."""
@@ -284,7 +296,7 @@ def contact_candidates(
     images = body_compliance(setup, bodies, positions, mesh, pair)
     cracks = window_cracks(setup, bodies, positions, mesh, pair, windows_of_bodies(setup.gears, mesh))
     for crack in cracks:
-        images[0] += crack.yielding()
+        crack.soften(images[0], crack.yielding())
     return Candidates(
         setup=setup,
         bodies=bodies,

@@ -15,7 +15,7 @@ there are none. Positions where that does not end, and loads that may be roundin
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import numpy as np
 
@@ -65,6 +65,13 @@ class BatchState:
     iterations: np.ndarray
     residual: np.ndarray
 
+    def with_rows(self, rows: np.ndarray, other: BatchState) -> BatchState:
+        """Put the solution at some positions (n,) in place of that here."""
+        values = {field.name: getattr(self, field.name).copy() for field in fields(self)}
+        for name, of_positions in values.items():
+            of_positions[rows] = getattr(other, name)
+        return BatchState(**values)
+
 
 def solve_batch(
     candidates: Candidates,
@@ -104,17 +111,28 @@ def solve_with_cracks(
     those of `solve_batch`. ContactError (E-CONTACT): faces that do not come to rest.
     """
     state = solve_batch(candidates, load, springs)
+    if not candidates.cracks:
+        return candidates, state
+    part, of_part, rows = candidates, state, np.arange(len(candidates.position))
+    closed = [crack.closed.copy() for crack in candidates.cracks]
     for number in range(_MOST_CRACKED):
-        moments = (candidates.polynomials * state.loads[..., None]).sum(axis=2)
-        wanted = [crack.closing(moments) for crack in candidates.cracks]
-        wrong = [closed != crack.closed for crack, closed in zip(candidates.cracks, wanted, strict=True)]
-        if not any(flips.any() for flips in wrong):
-            return candidates, state
+        moments = (part.polynomials * of_part.loads[..., None]).sum(axis=2)
+        wanted = [crack.closing(moments) for crack in part.cracks]
+        wrong = [faces != crack.closed for crack, faces in zip(part.cracks, wanted, strict=True)]
+        unsettled = np.flatnonzero(np.any([flips.any(axis=1) for flips in wrong], axis=0))
+        if not len(unsettled):
+            return candidates.with_closed(closed), state
         if number >= _CRACKS_AT_ONCE:
             wrong = [_last_flip(flips) for flips in wrong]
-        closed = [crack.closed ^ flips for crack, flips in zip(candidates.cracks, wrong, strict=True)]
-        candidates = candidates.with_closed(closed)
-        state = solve_batch(candidates, load, springs, start=state.active)
+        # positions do not know of one another: those that are settled stay
+        part, rows = part.at(unsettled), rows[unsettled]
+        part = part.with_closed(
+            [crack.closed ^ flips[unsettled] for crack, flips in zip(part.cracks, wrong, strict=True)]
+        )
+        of_part = solve_batch(part, load, springs, start=of_part.active[unsettled])
+        state = state.with_rows(rows, of_part)
+        for faces, crack in zip(closed, part.cracks, strict=True):
+            faces[rows] = crack.closed
     raise ContactError("the faces of a crack do not come to rest", code="E-CONTACT", limit=f"{_MOST_CRACKED} rounds")
 
 

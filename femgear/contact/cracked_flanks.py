@@ -155,30 +155,42 @@ class WindowCrack:
         Of the gear that has it.
     fault : Crack
         Which body it is in.
-    coordinates : (P, W, 3, R) array
-        Basis of `CrackedRing` at the nodes of all windows; zero on other bodies.
+    windows : (w,) int array
+        Those of all windows that lie on this body.
+    coordinates : (P, w, 3, R) array
+        Basis of `CrackedRing` at the nodes of these windows.
     closed : (P, k) bool array
         Pairs of nodes on its faces that touch.
     """
 
     flanks: CrackedFlanks
     fault: Crack
+    windows: np.ndarray
     coordinates: np.ndarray
     closed: np.ndarray
 
+    def at(self, rows: np.ndarray) -> WindowCrack:
+        """Take some of the positions."""
+        return replace(self, coordinates=self.coordinates[rows], closed=self.closed[rows])
+
     def yielding(self) -> np.ndarray:
-        """Compute what the crack adds to the compliance between the windows, (P, W, 3, W, 3) [m/N]."""
-        ring, (P, W, nodes, R) = self.flanks.ring, self.coordinates.shape
-        B = self.coordinates.reshape(P, W * nodes, R)
+        """Compute what the crack adds to the compliance between its windows, (P, w, 3, w, 3) [m/N]."""
+        ring, (P, w, nodes, R) = self.flanks.ring, self.coordinates.shape
+        B = self.coordinates.reshape(P, w * nodes, R)
         added = B @ ring.core @ B.swapaxes(1, 2)
         for p in np.flatnonzero(self.closed.any(axis=1)):
             on = self.closed[p]
             opened = ring.crossing[on] @ B[p].T
             added[p] -= opened.T @ np.linalg.solve(ring.faces[np.ix_(on, on)], opened)
-        return added.reshape(P, W, nodes, W, nodes)
+        return added.reshape(P, w, nodes, w, nodes)
+
+    def soften(self, compliance: np.ndarray, added: np.ndarray) -> None:
+        """Add some compliance between its windows (P, w, 3, w, 3) to that between all (P, W, 3, W, 3) [m/N]."""
+        # two lists of windows, apart from one another, put their axes first
+        compliance[:, self.windows[:, None], :, self.windows] += added.transpose(1, 3, 0, 2, 4)
 
     def closing(self, moments: np.ndarray) -> np.ndarray:
-        """Find the pairs of nodes (P, k) that touch under moments (P, W, 3) of the windows' loads [N].
+        """Find the pairs of nodes (P, k) that touch under moments (P, W, 3) of the loads of all windows [N].
 
         Openings under forces on the faces are ``w = w_0 + F f``, where neither is negative and one of both is zero.
         F is positive definite, so that these forces are those of a non-negative least-squares problem.
@@ -186,7 +198,7 @@ class WindowCrack:
         from scipy.optimize import nnls
 
         ring = self.flanks.ring
-        opened = np.einsum("pwnr,pwn->pr", self.coordinates, moments) @ ring.crossing.T
+        opened = np.einsum("pwnr,pwn->pr", self.coordinates, moments[:, self.windows]) @ ring.crossing.T
         lower = np.linalg.cholesky(ring.faces)
         closed = np.zeros(opened.shape, bool)
         for p in np.flatnonzero((opened < 0.0).any(axis=1)):
@@ -206,8 +218,6 @@ def window_cracks(setup: MeshWindows, bodies, positions, mesh, pair, windows_of)
     for fault in setup.cracks:
         flanks = {crack.form: crack for crack in bodies.gears[fault.gear].cracks}[fault.form]
         (basis, n), faces = (flanks.ring.basis, len(flanks.roll)), len(flanks.ring.faces)
-        P, W, nodes = len(positions), len(mesh), setup.roll.shape[-1]
-        coordinates = np.zeros((P, W, nodes, basis.shape[-1]))
         (body,) = (
             number
             for number, body in enumerate(setup.gears.bodies)
@@ -223,8 +233,7 @@ def window_cracks(setup: MeshWindows, bodies, positions, mesh, pair, windows_of)
             away, flank = -away, RIGHT - side
         index, weight = station_weights(setup.roll[place, j, positions[:, None], i], flanks.roll)
         index = index + (flank * n)[:, None, None]
-        values = basis[(away % len(basis))[..., None, None], index]
-        coordinates[:, members] = (weight[..., None] * values).sum(axis=-2)
-        coordinates /= np.sqrt(bodies.of_kinds(setup.kind(mesh)))[:, None, None]
-        cracks.append(WindowCrack(flanks, fault, coordinates, np.zeros((P, faces), bool)))
+        coordinates = (weight[..., None] * basis[(away % len(basis))[..., None, None], index]).sum(axis=-2)
+        coordinates /= np.sqrt(bodies.of_kinds(setup.kind(j)))[:, None, None]
+        cracks.append(WindowCrack(flanks, fault, members, coordinates, np.zeros((len(positions), faces), bool)))
     return tuple(cracks)

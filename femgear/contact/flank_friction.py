@@ -45,6 +45,10 @@ class WindowFriction:
     arms: np.ndarray
     supports: np.ndarray
 
+    def at(self, rows: np.ndarray) -> WindowFriction:
+        """Take some of the positions."""
+        return WindowFriction(self.factor[rows], self.arms[rows], self.supports[rows])
+
 
 def path_sense(path: np.ndarray, base_pitch: float) -> np.ndarray:
     """Give the sign of the sliding of gear 1 on gear 2 while gear 1 drives, by path coordinates (...) [m].

@@ -222,7 +222,7 @@ def machine_case(plan: FaultPlan, machine: int) -> tuple[Any, FaultPlace, np.nda
     values = {
         "title": f"{plan.case.title[:140]}: machine {machine} of seed {plan.seed}",
         "operation.torque": f"{torque:.6g} N m",
-        "operation.speeds": [f"{speed / SPEED.scale:.6g} rpm" for speed in drawn],
+        "operation.speeds": [f"{speed / SPEED.scale:.12g} rpm" for speed in drawn],
         **fault_entries(fault, gears),
     }
     return with_values(case, values), fault, errors
@@ -261,8 +261,9 @@ def solve_machine(plan: FaultPlan, machine: int) -> MachineRecords:
     angle = 2.0 * np.pi * lines.turns * shares
     for row, number in enumerate(numbers):
         values = lines.acceleration[row] * np.exp(1j * lines.order * angle[row])
-        options = {"samples": plan.samples, "rate": plan.rate}
-        recorded = sampled_signal(lines.order, values, float(lines.base_speed[row]), **options)
+        # whole numbers of periods until all repeats make a grid of few samples
+        speed = float(lines.base_speed[row]) / lines.turns
+        recorded = sampled_signal(lines.number, values, speed, samples=plan.samples, rate=plan.rate)
         noise = np.random.default_rng([plan.seed, number, _RECORD, 1]).standard_normal(plan.samples)
         signal[row] = recorded + plan.noise * np.sqrt(np.mean(recorded**2)) * noise
     return MachineRecords(machine, case, fault, errors, angle, signal, lines)
@@ -273,4 +274,4 @@ def record_case(plan: FaultPlan, record: int) -> str:
     case, *_ = machine_case(plan, record // plan.each)
     speed = case.operation.speeds[record % plan.each]
     title = f"{case.title[:140]}, record {record}"
-    return to_toml(with_values(case, {"title": title, "operation.speeds": [f"{speed / SPEED.scale:.6g} rpm"]}))
+    return to_toml(with_values(case, {"title": title, "operation.speeds": [f"{speed / SPEED.scale:.12g} rpm"]}))
