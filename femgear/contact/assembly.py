@@ -192,6 +192,13 @@ class Candidates:
             images[0, rows] = there
         return replace(self, images=images, cracks=tuple(cracks))
 
+    def without_cracks(self) -> Candidates:
+        """Leave out what cracks yield."""
+        images = self.images.copy()
+        for crack in self.cracks:
+            crack.soften(images[0], -crack.yielding())
+        return replace(self, images=images, cracks=())
+
     def at(self, rows: np.ndarray) -> Candidates:
         """Take some of the positions, by their places (n,) among these."""
         names = ("position", "pair", "gap", "candidate", "polynomials", "local")
@@ -327,6 +334,8 @@ def body_compliance(setup: MeshWindows, bodies: Bodies, positions, mesh, pair) -
 
     At positions (P,), of meshes (W,) and pairs (P, W).
     """
+    first, again = _different_positions(setup, positions, mesh, pair)
+    positions, pair = np.asarray(positions)[first], pair[first]
     (P, W), nodes = pair.shape, setup.roll.shape[-1]
     smooth = np.zeros((setup.images, P, W, nodes, W, nodes))
     for number, members, gear, side in windows_of_bodies(setup.gears, mesh):
@@ -338,7 +347,22 @@ def body_compliance(setup: MeshWindows, bodies: Bodies, positions, mesh, pair) -
         sectors = smooth[:1] if setup.gears.repeated[number] else smooth
         _add_body(sectors, body, members, roll, setup.tooth[gear, j, i], side)
     root = np.sqrt(bodies.of_kinds(setup.kind(mesh)))
-    return smooth / (root[:, None, None, None] * root[:, None])
+    smooth /= root[:, None, None, None] * root[:, None]
+    return smooth if first is again else smooth[:, again]
+
+
+def _different_positions(setup: MeshWindows, positions, mesh, pair) -> tuple[np.ndarray, np.ndarray]:
+    """Find those of some positions (P,) whose windows lie at different places of their flanks, and which all repeat.
+
+    Records of one mesh period have no others.
+    """
+    every, turns = np.arange(len(positions)), setup.turns[positions]
+    if (turns == turns[:1]).all():
+        return every, every
+    rolls = np.rint(setup.roll[:, mesh, np.asarray(positions)[:, None], pair] / _SAME_ROLL)
+    places = np.hstack([pair, np.moveaxis(rolls, 1, 0).reshape(len(pair), -1)])
+    _, first, again = np.unique(places.astype(np.int64), axis=0, return_index=True, return_inverse=True)
+    return (every, every) if len(first) == len(every) else (first, again.ravel())
 
 
 def windows_of_bodies(gears: GearSet, mesh: np.ndarray) -> list[tuple]:

@@ -38,6 +38,8 @@ _RESIDUAL = 1e-12
 """Violation above which a position is solved again by itself."""
 _CRACKS_AT_ONCE, _MOST_CRACKED = 8, 200
 """Rounds in which all nodes on faces of cracks change sides that must, and rounds in all: later ones change one."""
+_SAME_PLACE = 1e-9
+"""Distance of positions that count as one [mesh periods]."""
 _ROUNDS, _SETTLED = 60, 1e-14
 """Solutions of a position by itself that friction may ask for, each with that of the one before; change of the last."""
 
@@ -110,11 +112,13 @@ def solve_with_cracks(
     Give the candidates with the faces that touch, whose compliance is that of cracks closed there. The arguments are
     those of `solve_batch`. ContactError (E-CONTACT): faces that do not come to rest.
     """
-    state = solve_batch(candidates, load, springs)
     if not candidates.cracks:
-        return candidates, state
+        return candidates, solve_batch(candidates, load, springs)
+    start, guess = _healthy_start(candidates, load, springs)
+    candidates = candidates.with_closed(guess)
+    state = solve_batch(candidates, load, springs, start=start)
     part, of_part, rows = candidates, state, np.arange(len(candidates.position))
-    closed = [crack.closed.copy() for crack in candidates.cracks]
+    closed = [faces.copy() for faces in guess]
     for number in range(_MOST_CRACKED):
         moments = (part.polynomials * of_part.loads[..., None]).sum(axis=2)
         wanted = [crack.closing(moments) for crack in part.cracks]
@@ -134,6 +138,24 @@ def solve_with_cracks(
         for faces, crack in zip(closed, part.cracks, strict=True):
             faces[rows] = crack.closed
     raise ContactError("the faces of a crack do not come to rest", code="E-CONTACT", limit=f"{_MOST_CRACKED} rounds")
+
+
+def _healthy_start(
+    candidates: Candidates, load, springs: BearingSprings | None
+) -> tuple[np.ndarray | None, list[np.ndarray]]:
+    """Guess the touching cells (P, W, C) and the closed pairs of nodes (P, k) of every crack.
+
+    Those of the gears without cracks, whose state is the same in all mesh periods; where few positions repeat one
+    another, no cells and no pairs.
+    """
+    zeta, pitch = candidates.setup.zeta[0, candidates.position, 0], candidates.setup.gears.base_pitch
+    _, first, again = np.unique(np.rint(zeta / (_SAME_PLACE * pitch)), return_index=True, return_inverse=True)
+    if 2 * len(first) > len(again):
+        return None, [crack.closed for crack in candidates.cracks]
+    whole = candidates.at(first).without_cracks()
+    state = solve_batch(whole, load, springs, refined=False)
+    moments = (whole.polynomials * state.loads[..., None]).sum(axis=2)[again]
+    return state.active[again], [crack.closing(moments) for crack in candidates.cracks]
 
 
 def _last_flip(flips: np.ndarray) -> np.ndarray:

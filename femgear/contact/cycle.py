@@ -368,8 +368,8 @@ class _Solved:
     ----------
     values : dict
         What `MeshCycle` keeps of them, by the names of its fields.
-    overflow : bool
-        Whether a contact leaves its window.
+    overflow : (n,) bool array
+        Whether a contact near the position leaves its window.
     nearest : float
         What pairs must come within to be listed in windows that hold the contact [m]; zero where these do.
     candidates : int
@@ -377,9 +377,23 @@ class _Solved:
     """
 
     values: dict[str, Any]
-    overflow: bool
+    overflow: np.ndarray
     nearest: float
     candidates: int
+
+
+def _joined(blocks: list[_Solved], rows: np.ndarray, known: _Solved | None) -> _Solved:
+    """Join blocks of solved positions (n,), and put them in place of those in what is ``known``, if anything is."""
+    values = {name: np.concatenate([block.values[name] for block in blocks], axis=-1) for name in blocks[0].values}
+    overflow = np.concatenate([block.overflow for block in blocks])
+    nearest, most = max(block.nearest for block in blocks), max(block.candidates for block in blocks)
+    if known is None or len(rows) == len(known.overflow):
+        return _Solved(values, overflow, nearest, most)
+    joined, overflowing = {name: before.copy() for name, before in known.values.items()}, known.overflow.copy()
+    for name, of_rows in values.items():
+        joined[name][..., rows] = of_rows
+    overflowing[rows] = overflow
+    return _Solved(joined, overflowing, nearest, max(most, known.candidates))
 
 
 @dataclass(frozen=True)
@@ -464,23 +478,39 @@ class _Walk:
 
     def _solved_in_place(self, share: float, nearest: float) -> tuple[MeshCycle | None, float, float]:
         """Solve as `attempt`, at every position."""
-        record, wider, further = self._attempt(share, nearest, None)
-        if record is None or not self._far_off:
-            return record, wider, further
-        turned = np.zeros(record.deflection.shape)
+        every = np.arange(len(self.empty.position) // self.repeats)
+        setup, solved = self._solved_at(every, share, nearest, None, None)
+        if not self._far_off:
+            return self._outcome(setup, solved, share, nearest)
+        turned = np.zeros((len(self.planetary_set.meshes), len(every)))
         for _ in range(_MOST_TURNS):
-            before, turned = turned, self._turned(record)
-            if np.abs(turned - before).max() <= _TURNED * np.abs(turned).max():
-                return record, wider, further
-            record, wider, further = self._attempt(share, nearest, turned)
-            if record is None:
-                return record, wider, further
-        raise ContactError(
-            "the gears do not come to rest where a tooth is missing",
-            code="E-CONTACT",
-            limit=f"{_MOST_TURNS} solutions",
-            remedy=LESS_TORQUE,
-        )
+            if solved.nearest > 0.0:
+                break
+            before, turned = turned, self._turned(solved.values)
+            moved = np.abs(turned - before).max(axis=0) > _TURNED * np.abs(turned).max()
+            if not moved.any():
+                break
+            setup, solved = self._solved_at(np.flatnonzero(moved), share, nearest, turned, solved)
+        else:
+            raise ContactError(
+                "the gears do not come to rest where a tooth is missing",
+                code="E-CONTACT",
+                limit=f"{_MOST_TURNS} solutions",
+                remedy=LESS_TORQUE,
+            )
+        return self._outcome(setup, solved, share, nearest)
+
+    def _outcome(
+        self, setup: MeshWindows, solved: _Solved, share: float, nearest: float
+    ) -> tuple[MeshCycle | None, float, float]:
+        """The record of solved positions, and the windows to try next, as of `attempt`."""
+        if solved.nearest > 0.0:
+            return None, share, solved.nearest
+        record = self._record(solved.values, setup, self._places(), self.images * solved.candidates)
+        if solved.overflow.any():
+            largest = 0.0 if record.slice_load is None else record.slice_load.max()
+            share = enlarged(share, max(record.force.max(), record.back_force.max(), largest))
+        return record, share, nearest
 
     @property
     def _far_off(self) -> bool:
@@ -488,69 +518,63 @@ class _Walk:
         faults = () if self.deviations is None else self.deviations.faults
         return any(isinstance(fault, MissingTooth | BrokenTip) for fault in faults)
 
-    def _turned(self, record: MeshCycle) -> np.ndarray:
+    def _turned(self, values: dict[str, Any]) -> np.ndarray:
         """Arcs (M, P) [m] by which gear 1 of every mesh turns, with its motion along the line of action.
 
         Of the first kind of mesh it is the driver, of the next one the planets, whose flanks approach a gear that is
         held.
         """
-        turned = record.deflection.copy()
-        turned[self.planetary_set.kind_rows[0]] = record.sun_arc
+        turned = values["deflection"].copy()
+        turned[self.planetary_set.kind_rows[0]] = values["sun_arc"]
         return turned
 
-    def _attempt(
-        self, share: float, nearest: float, turned: np.ndarray | None
-    ) -> tuple[MeshCycle | None, float, float]:
-        """Solve all positions as `attempt`, with gears turned by arcs (M, P) [m]."""
-        options, empty = self.options, self.empty
-        tau, each = empty.position, 1
-        if options.ahead is not None:
-            tau, each = tau[:, None] + options.ahead, len(options.ahead)
-        P = len(empty.position) // self.repeats
+    def _places(self) -> np.ndarray:
+        """All positions (P,) [mesh periods], of slices of helical teeth (P, S)."""
+        ahead = self.options.ahead
+        return self.empty.position if ahead is None else self.empty.position[:, None] + ahead
+
+    def _solved_at(
+        self, rows: np.ndarray, share: float, nearest: float, turned: np.ndarray | None, known: _Solved | None
+    ) -> tuple[MeshWindows, _Solved]:
+        """Solve some positions (n,) with gears turned by arcs (M, P) [m]; others are taken from what is ``known``."""
+        options = self.options
+        tau, each = self._places(), 1 if options.ahead is None else len(options.ahead)
         setup = mesh_windows(
             self.sector,
             self.bodies,
             share=share,
             nearest=nearest,
-            positions=tau[:P],
-            contact=empty.contact,
+            positions=tau[: len(tau) // self.repeats],
+            contact=self.empty.contact,
             cells=options.cells,
             deviations=self.deviations,
             both_flanks=options.both_flanks,
             turned=None if turned is None else np.repeat(turned, each, axis=1),
+            all_pairs=self._far_off,
         )
         setup = replace(setup, images=self.images)
         if options.planet_gaps is not None:
             setup = setup.with_planet_gaps(options.planet_gaps)
         together = _TOGETHER if each == 1 else max(_ROWS // each, 2)
         # windows that are too small show at the first position: slices of all others need not wait for it
-        starts = range(0, P, together) if each == 1 else [0, *range(1, P, together)]
-        parts = [partial(self._solve_positions, setup, first, end, each) for first, end in pairwise([*starts, P])]
+        starts = [*range(0, len(rows), together)] if each == 1 else [0, *range(1, len(rows), together)]
+        blocks = [rows[first:end] for first, end in pairwise([*starts, len(rows)])]
+        parts = [partial(self._solve_positions, setup, block, each) for block in blocks]
         # many parts are worth another process, but for the first one, which shows whether windows hold the contact
-        alone = 1 if len(parts) > _MANY_PARTS else len(parts)
-        solved = []
+        alone, solved = 1 if len(parts) > _MANY_PARTS else len(parts), list[_Solved]()
         for part in parts[:alone]:
             solved.append(part())
             if solved[-1].nearest > 0.0:
-                return None, share, solved[-1].nearest
+                return setup, solved[-1]
         solved += second_process.shared(parts[alone:])
-        for block in solved:
-            if block.nearest > 0.0:
-                return None, share, block.nearest
-        unknowns = self.images * max(block.candidates for block in solved)
-        overflow, values = any(block.overflow for block in solved), [block.values for block in solved]
-        record = self._record(values, setup, tau, unknowns)
-        if overflow:
-            largest = 0.0 if record.slice_load is None else record.slice_load.max()
-            share = enlarged(share, max(record.force.max(), record.back_force.max(), largest))
-        return record, share, nearest
+        return setup, _joined(solved, rows, known)
 
-    def _solve_positions(self, setup: MeshWindows, first: int, end: int, each: int) -> _Solved:
-        """Solve the contact at positions from ``first`` to ``end`` of the windows, each of so many slices."""
+    def _solve_positions(self, setup: MeshWindows, block: np.ndarray, each: int) -> _Solved:
+        """Solve the contact at some positions (n,) of the windows, each of so many slices."""
         options, positions = self.options, len(self.empty.position) // self.repeats
-        rows = (np.arange(first, end)[:, None] * each + np.arange(each)).ravel()
+        rows = (block[:, None] * each + np.arange(each)).ravel()
         candidates = contact_candidates(setup, self.bodies, rows, self.members, options.friction)
-        if first == 0:
+        if block[0] == 0:
             # bodies that are no elastic bodies are refused before anything rests on them
             check_definite(candidates)
         load = np.zeros(candidates.approach.shape[1])
@@ -570,8 +594,9 @@ class _Walk:
         if self.empty.contact == "profile":
             nearest = 1.2 * max(float(needed_nearest(candidates, approach, force).max()), 0.0)
         if options.progress is not None:
-            options.progress(end, positions)  # to nobody from a second process
-        return _Solved(values, bool(overflow), nearest, int(candidates.candidate.sum(axis=(1, 2)).max()))
+            options.progress(int(block[-1]) + 1, positions)  # to nobody from a second process
+        most = int(candidates.candidate.sum(axis=(1, 2)).max())
+        return _Solved(values, np.full(len(block), bool(overflow)), nearest, most)
 
     def attempt_with_peaks(self, share: float, nearest: float) -> tuple[MeshCycle | None, float, float]:
         """Solve all positions, and those between them at which extremes lie, in windows of one size."""
@@ -733,7 +758,7 @@ class _Walk:
             values["held_tangents"] = tangents.between_meshes(held, meshes)
         return values
 
-    def _record(self, blocks: list[dict], setup: MeshWindows, tau: np.ndarray, unknowns: int) -> MeshCycle:
+    def _record(self, values: dict[str, Any], setup: MeshWindows, tau: np.ndarray, unknowns: int) -> MeshCycle:
         """The record from what was found at its positions: with places of the tooth pairs, pins, message.
 
         ``tau`` are all positions, of every slice.
@@ -741,8 +766,7 @@ class _Walk:
         cells, every, driven = setup.cells, setup.places[0], self.planetary_set.kind_rows[0]
         meshes = len(self.planetary_set.meshes)
         drive, back = slice(0, meshes), slice(meshes, 2 * meshes)
-        values = {name: np.concatenate([block[name] for block in blocks], axis=-1) for name in blocks[0]}
-        path, tooth = np.moveaxis(setup.zeta, 2, 1), setup.tooth
+        values, path, tooth = dict(values), np.moveaxis(setup.zeta, 2, 1), setup.tooth
         if self.repeats > 1:
             values, path, tooth = self._with_all_pairs(values, setup, tau)
         path = path.reshape(*path.shape[:2], len(self.empty.position), -1).mean(axis=-1)
@@ -768,6 +792,9 @@ class _Walk:
                 values |= {name: values[name][every] for name in names if name in values}
         if self.repeats > 1:
             values |= self._repeated(values)
+        elif self._far_off:
+            values["near"] = _pairs_near(setup, meshes, tau[0].size)
+        if "near" in values:
             values = self._with_near_pairs(values)
         record = replace(self.empty, **values)
         unloaded = record.force[driven] + record.back_force[driven] <= 0.0
@@ -887,6 +914,14 @@ class _Walk:
             for name in (name for name in moved if name in values):
                 repeated[name].append(np.concatenate(_mapped(moved[name], values[name], planet, _turn(angle))))
         return {name: np.concatenate(parts, axis=-1) for name, parts in repeated.items() if parts}
+
+
+def _pairs_near(setup: MeshWindows, meshes: int, slices: int) -> np.ndarray:
+    """Which pairs of every mesh come near on either flank, in any of the slices, (M, T, P)."""
+    listed = setup.listed.near
+    listed = listed.reshape(-1, meshes, listed.shape[1] // slices, slices, listed.shape[2])
+    near: np.ndarray = np.asarray(listed.any(axis=(0, 3)))
+    return near.swapaxes(1, 2)
 
 
 def _repeated_record(record: MeshCycle, empty: MeshCycle, again: np.ndarray) -> MeshCycle:

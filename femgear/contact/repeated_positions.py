@@ -1,9 +1,8 @@
 """Positions of a record at which a set with faulty teeth is in the same state: only one of each is solved.
 
 A faulty tooth meets its mates for some mesh periods, and is far from them in all others. There the set repeats itself
-mesh period by mesh period, but for rounding; with errors that turn as well nothing repeats. A crack yields under loads
-on other teeth of its gear too, the less the further these are away: where its share in the compliance is below
-`_FAR`, positions count as those without it.
+mesh period by mesh period, but for rounding; with errors that turn as well nothing repeats. Nor does anything with a
+crack: it yields under loads on all teeth of its gear.
 """
 
 from __future__ import annotations
@@ -13,19 +12,14 @@ from dataclasses import replace
 import numpy as np
 
 from femgear.contact.bodies import Bodies
-from femgear.contact.cracked_flanks import CrackedFlanks
 from femgear.contact.flank_pairs import acting_flanks, mesh_pairs, pair_separations, tooth_steps
 from femgear.contact.windows import in_mesh_periods, mesh_windows, pair_paths
 from femgear.gears.deviations import SetDeviations
-from femgear.gears.faults import LEFT, BrokenTip, Crack, MissingTooth, ToothFault
+from femgear.gears.faults import BrokenTip, Crack, MissingTooth, ToothFault
 from femgear.gears.pair import GearSet
 
 _SAME_PLACE, _SAME_SEPARATION = 1e-9, 1e-15
 """Distance of positions [mesh periods] and of flanks [m] that count as one."""
-_FAR = 1e-10
-"""Part of the compliance of a flank below which a crack is far away."""
-_ELSEWHERE = 1 << 40
-"""Teeth to a fault of pairs that do not have its body."""
 
 
 def different_positions(
@@ -59,6 +53,8 @@ def different_positions(
     every = np.arange(len(positions))
     if deviations is None or not any(fault.tooth is not None for fault in deviations.faults):
         return every, every
+    if any(isinstance(fault, Crack) for fault in deviations.faults):
+        return every, every
     tau, turns = in_mesh_periods(positions)
     places = np.rint((tau - turns) / _SAME_PLACE).astype(np.int64)
     _, first, place = np.unique(places, return_index=True, return_inverse=True)
@@ -72,11 +68,8 @@ def different_positions(
     apart = np.rint(np.where(near, shift, 0.0) / _SAME_SEPARATION).astype(np.int64)
     states = [places[:, None], np.moveaxis(apart, 1, 0).reshape(len(tau), -1)]
     for fault in (fault for fault in deviations.faults if fault.tooth is not None):
-        away = _teeth_away(gears, fault, setup.listed.tooth, turns)
-        if isinstance(fault, Crack):
-            states.append(_near_crack(gears, bodies, fault, np.where(near, away, _ELSEWHERE), turns)[:, None])
-        else:
-            states.append(np.moveaxis((away == 0) & near, 1, 0).reshape(len(tau), -1).astype(np.int64))
+        faulty = _on_faulty_tooth(gears, fault, setup.listed.tooth, turns)
+        states.append(np.moveaxis(faulty & near, 1, 0).reshape(len(tau), -1).astype(np.int64))
     _, first, again = np.unique(np.hstack(states), axis=0, return_index=True, return_inverse=True)
     order = np.argsort(first)
     return first[order], np.argsort(order)[again.ravel()]
@@ -104,31 +97,18 @@ def _may_touch(
     return near
 
 
-def _teeth_away(gears: GearSet, fault: ToothFault, tooth: np.ndarray, turns: np.ndarray) -> np.ndarray:
-    """Count the teeth (M, P, T) from the faulty tooth to that of every pair, 0 to z - 1; `_ELSEWHERE` of others.
+def _on_faulty_tooth(gears: GearSet, fault: ToothFault, tooth: np.ndarray, turns: np.ndarray) -> np.ndarray:
+    """Tell of every pair (M, P, T) whether it is one of the faulty flank.
 
     Of teeth (2, M, T) in the first mesh period. Pairs of the other flank have no fault that takes material off.
     """
     meshes, (periods, pairs) = tooth.shape[1], (len(turns), tooth.shape[2])
-    away = np.full((meshes, periods, pairs), _ELSEWHERE)
+    faulty = np.zeros((meshes, periods, pairs), bool)
     for body, (number, acting) in zip(gears.bodies, acting_flanks(gears), strict=True):
         if number != fault.gear or body.copy != fault.copy:
             continue
         for mesh, place, side in acting:
-            if fault.flank in (None, side) or isinstance(fault, Crack):
+            if fault.flank in (None, side):
                 numbers = tooth[place, mesh] + tooth_steps(gears, mesh, place) * turns[:, None]
-                away[mesh] = (numbers - (fault.tooth or 0)) % gears.gears[number].teeth
-    return away
-
-
-def _near_crack(gears: GearSet, bodies: Bodies, fault: Crack, away: np.ndarray, turns: np.ndarray) -> np.ndarray:
-    """Mesh periods (P,) by which positions differ near a crack, -1 far from it; ``away`` (M, P, T) as of
-    `_teeth_away`."""
-    gear = bodies.gears[fault.gear]
-    flanks: CrackedFlanks = {crack.form: crack for crack in gear.cracks}[fault.form]
-    ring, teeth = flanks.ring, gears.gears[fault.gear].teeth
-    by_tooth = np.linalg.norm(ring.basis, axis=(1, 2)) ** 2 * np.linalg.norm(ring.core)
-    if fault.flank is not None and fault.flank != LEFT:
-        by_tooth = by_tooth[-np.arange(teeth) % teeth]  # the image has its crack on the left
-    share = np.where(away < teeth, by_tooth[away % teeth], 0.0).max(axis=(0, 2)) / gear.regular[0].diagonal().max()
-    return np.where(share > _FAR, turns % teeth, -1)
+                faulty[mesh] = (numbers - (fault.tooth or 0)) % gears.gears[number].teeth == 0
+    return faulty

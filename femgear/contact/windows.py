@@ -29,7 +29,7 @@ from femgear.contact.flank_pairs import (
 from femgear.contact.local_compliance import hertz_half_width, surface_displacement
 from femgear.errors import LESS_TORQUE, ContactError
 from femgear.gears.deviations import SetDeviations
-from femgear.gears.faults import Crack, missing_length
+from femgear.gears.faults import Crack, MissingTooth, missing_length
 from femgear.gears.pair import GearSet
 
 WINDOW_NODES = np.array([0.0, 0.5, 1.0])
@@ -197,6 +197,7 @@ def mesh_windows(  # noqa: PLR0913
     deviations: SetDeviations | None = None,
     both_flanks: bool = False,
     turned: np.ndarray | None = None,
+    all_pairs: bool = False,
 ) -> MeshWindows:
     """Place the contact windows of every mesh at every position.
 
@@ -227,7 +228,12 @@ def mesh_windows(  # noqa: PLR0913
     widths, cells = _over_gaps(planetary_set, deviations, pairs, widths, cells, nearest)
     whole = deviations
     if deviations is not None and deviations.faults:
-        faults = [fault for fault in deviations.faults if not missing_length(fault, planetary_set)]
+        # nor does a tooth that is missing say where others come nearest
+        faults = [
+            fault
+            for fault in deviations.faults
+            if not isinstance(fault, MissingTooth) and not missing_length(fault, planetary_set)
+        ]
         whole = replace(deviations, faults=tuple(faults))
     windows_of_meshes, teeth = [], []
     for direction in (DRIVE_SIDE, BACK_SIDE) if both_flanks else (DRIVE_SIDE,):
@@ -248,7 +254,7 @@ def mesh_windows(  # noqa: PLR0913
             }
             windows_of_meshes.append(windows(contact_pair, zeta[rows], shift=shift[rows], **options))
         teeth.append(tooth)
-    setup = _gathered(windows_of_meshes, planetary_set, np.concatenate(teeth, axis=1), turns, bodies, cells)
+    setup = _gathered(windows_of_meshes, planetary_set, np.concatenate(teeth, axis=1), turns, bodies, cells, all_pairs)
     faults = () if deviations is None else deviations.faults
     return replace(setup, cracks=tuple(fault for fault in faults if isinstance(fault, Crack)))
 
@@ -503,10 +509,13 @@ def _window_compliance(
 
 
 def _gathered(
-    windows_of_meshes: list[Windows], gears: GearSet, tooth, turns, bodies: Bodies, cells: int
+    windows_of_meshes: list[Windows], gears: GearSet, tooth, turns, bodies: Bodies, cells: int, all_pairs: bool
 ) -> MeshWindows:
-    """Join all meshes; leading and trailing pairs that never come near are listed, but have no windows."""
-    take = kept_pairs(np.concatenate([w.near.any(axis=1) for w in windows_of_meshes]))
+    """Join all meshes; leading and trailing pairs that never come near are listed, but have no windows.
+
+    Unless ``all_pairs`` have.
+    """
+    take = kept_pairs(np.concatenate([w.near.any(axis=1) | all_pairs for w in windows_of_meshes]))
     first, mesh = take[:, 0], np.arange(len(take))
     places = mesh[:, None, None], np.arange(len(turns))[:, None], take[:, None, :]
     parts = {}

@@ -74,6 +74,26 @@ def test_the_other_torque_opens_the_crack_on_the_other_flank(gears, bodies, open
     assert np.sort(turned.sun_arc) == pytest.approx(np.sort(opened.sun_arc), rel=1e-9)
 
 
+def test_positions_of_several_mesh_periods_know_nothing_of_one_another(gears, bodies):
+    """Compliance that positions share, and starts from gears without the crack, change none of them."""
+    share, nearest = first_windows(gears, bodies, TORQUE)
+    deviations = replace(no_deviations(gears), faults=(CRACK,))
+    options = {"positions": np.arange(0, 27, 0.5), "deviations": deviations}
+    setup = mesh_windows(gears, bodies, share=share, nearest=nearest, **options)
+    several = contact_candidates(setup, bodies, np.arange(54))
+    load = np.zeros(several.approach.shape[1])
+    load[setup.driver] = TORQUE / gears.sun.base_radius
+    closed, together = solve_with_cracks(several, load)
+    assert np.array_equal(closed.images, closed.at(np.arange(54)).images)
+    for at in (0, 3, 20, 21):
+        alone = contact_candidates(setup, bodies, [at])
+        assert several.images[:, at] == pytest.approx(alone.images[:, 0], rel=1e-12, abs=1e-22)
+        settled, state = solve_with_cracks(alone, load)
+        assert np.array_equal(settled.cracks[0].closed[0], closed.cracks[0].closed[at])
+        assert settled.images[:, 0] == pytest.approx(closed.images[:, at], rel=1e-9, abs=1e-19)
+        assert state.motions[0] == pytest.approx(together.motions[at], rel=1e-9)
+
+
 @pytest.mark.parametrize("flank", [LEFT, RIGHT])
 def test_flanks_and_faces_are_one_complementarity_problem(gears, bodies, flank):
     """The solution of all candidates together, those of the faces behind those of the flanks."""

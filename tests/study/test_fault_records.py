@@ -56,6 +56,24 @@ def test_a_record_is_that_of_a_run_of_its_case(plan, worn):
 
 
 @pytest.mark.slow
+def test_a_cracked_machine_is_the_same_alone(case):
+    signals = []
+    for machines in ((0, 1), (1,)):  # after another one, and alone
+        plan = fault_plan(
+            case, FaultRequest(kinds=("crack",), **SHORT | {"gears": ("sun",)}), STILL, cache=grid_cache()
+        )
+        signals.append([solve_machine(plan, machine).signal for machine in machines][-1])
+    assert np.isfinite(signals[0]).all()
+    assert np.array_equal(*signals)
+
+
+def test_speeds_of_a_machine_are_never_rounded_to_one(case):
+    """Of 20 speeds within 2 rpm some are alike to six figures."""
+    request = FaultRequest(kinds=("healthy",), seed=7, each=20, speeds=("1000 rpm", "1002 rpm"))
+    assert len(set(machine_case(fault_plan(case, request, cache=grid_cache()), 0)[0].operation.speeds)) == 20
+
+
+@pytest.mark.slow
 def test_a_record_of_a_pit_is_that_of_a_run_of_its_case(case):
     request = FaultRequest(kinds=("spall",), **SHORT | {"gears": ("sun",)})
     plan = fault_plan(case, request, STILL, cache=grid_cache())
