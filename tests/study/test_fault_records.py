@@ -57,11 +57,9 @@ def test_a_record_is_that_of_a_run_of_its_case(plan, worn):
 
 @pytest.mark.slow
 def test_a_cracked_machine_is_the_same_alone(case):
-    signals = []
+    signals, request = [], FaultRequest(kinds=("healthy", "crack"), **SHORT | {"gears": ("sun",)})
     for machines in ((0, 1), (1,)):  # after another one, and alone
-        plan = fault_plan(
-            case, FaultRequest(kinds=("crack",), **SHORT | {"gears": ("sun",)}), STILL, cache=grid_cache()
-        )
+        plan = fault_plan(case, request, STILL, cache=grid_cache())
         signals.append([solve_machine(plan, machine).signal for machine in machines][-1])
     assert np.isfinite(signals[0]).all()
     assert np.array_equal(*signals)
