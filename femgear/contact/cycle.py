@@ -382,18 +382,18 @@ class _Solved:
     candidates: int
 
 
-def _joined(blocks: list[_Solved], rows: np.ndarray, known: _Solved | None) -> _Solved:
-    """Join blocks of solved positions (n,), and put them in place of those in what is ``known``, if anything is."""
+def _joined(blocks: list[_Solved], rows: np.ndarray, before: _Solved | None) -> _Solved:
+    """Join blocks of solved positions (n,), and put them in place of those in those ``before``, if there are any."""
     values = {name: np.concatenate([block.values[name] for block in blocks], axis=-1) for name in blocks[0].values}
     overflow = np.concatenate([block.overflow for block in blocks])
     nearest, most = max(block.nearest for block in blocks), max(block.candidates for block in blocks)
-    if known is None or len(rows) == len(known.overflow):
+    if before is None or len(rows) == len(before.overflow):
         return _Solved(values, overflow, nearest, most)
-    joined, overflowing = {name: before.copy() for name, before in known.values.items()}, known.overflow.copy()
+    joined, overflowing = {name: values_before.copy() for name, values_before in before.values.items()}, before.overflow.copy()
     for name, of_rows in values.items():
         joined[name][..., rows] = of_rows
     overflowing[rows] = overflow
-    return _Solved(joined, overflowing, nearest, max(most, known.candidates))
+    return _Solved(joined, overflowing, nearest, max(most, before.candidates))
 
 
 @dataclass(frozen=True)
@@ -534,9 +534,9 @@ class _Walk:
         return self.empty.position if ahead is None else self.empty.position[:, None] + ahead
 
     def _solved_at(
-        self, rows: np.ndarray, share: float, nearest: float, turned: np.ndarray | None, known: _Solved | None
+        self, rows: np.ndarray, share: float, nearest: float, turned: np.ndarray | None, before: _Solved | None
     ) -> tuple[MeshWindows, _Solved]:
-        """Solve some positions (n,) with gears turned by arcs (M, P) [m]; others are taken from what is ``known``."""
+        """Solve some positions (n,) with gears turned by arcs (M, P) [m]; others are taken from ``before``."""
         options = self.options
         tau, each = self._places(), 1 if options.ahead is None else len(options.ahead)
         setup = mesh_windows(
@@ -567,7 +567,7 @@ class _Walk:
             if solved[-1].nearest > 0.0:
                 return setup, solved[-1]
         solved += second_process.shared(parts[alone:])
-        return setup, _joined(solved, rows, known)
+        return setup, _joined(solved, rows, before)
 
     def _solve_positions(self, setup: MeshWindows, block: np.ndarray, each: int) -> _Solved:
         """Solve the contact at some positions (n,) of the windows, each of so many slices."""
