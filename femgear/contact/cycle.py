@@ -389,7 +389,10 @@ def _joined(blocks: list[_Solved], rows: np.ndarray, before: _Solved | None) -> 
     nearest, most = max(block.nearest for block in blocks), max(block.candidates for block in blocks)
     if before is None or len(rows) == len(before.overflow):
         return _Solved(values, overflow, nearest, most)
-    joined, overflowing = {name: values_before.copy() for name, values_before in before.values.items()}, before.overflow.copy()
+    joined, overflowing = (
+        {name: values_before.copy() for name, values_before in before.values.items()},
+        before.overflow.copy(),
+    )
     for name, of_rows in values.items():
         joined[name][..., rows] = of_rows
     overflowing[rows] = overflow
