@@ -30,10 +30,10 @@ _TEETH = (*_STAYS, "strength", "helical", "planar", "model", "format")
 """Sections of a case that the teeth of a stage have."""
 _OF_GEARBOX = "runup", "lubricant", "losses"
 """Sections that the gearbox has as the case does."""
-_OF_PLANAR = (
-    *("branch", "response", "published", "back_flanks", "damping_ratios", "smoothing", "gyroscopic", "reaction"),
-)
+_OF_PLANAR = (*("branch", "published", "damping_ratios", "smoothing", "gyroscopic", "reaction"),)
 """Entries of planar sets that a gearbox has not."""
+_MOST_TURNS = 24
+"""Turns of the carrier beside a mesh harmonic that a gearbox takes."""
 _NO_NAME = re.compile(r"[^A-Za-z0-9_.-]+")
 """What names of parts do not have."""
 _MACHINE_MASS = "1 kg"
@@ -94,6 +94,7 @@ def gearbox_of_case(case: Any) -> WrittenAsGearbox:
     up_to = case.dynamics.up_to
     dynamics = {"mesh_harmonics": _mesh_harmonics(case), "up_to": None if up_to is None else quantity(up_to, "Hz")}
     tables["dynamics"] = {key: value for key, value in dynamics.items() if value is not None}
+    tables["balance"] = _balance(case)
     tables |= {name: given[name] for name in _OF_GEARBOX if name in given}
     if seals := given.get("losses", {}).get("seal"):
         seals = [seal | {"shaft": seal["shaft"].replace("_", " ")} for seal in seals]
@@ -163,6 +164,16 @@ def _mesh_harmonics(case: Any) -> int | None:
     """Harmonics of the excitation, no more than the positions of the static contact carry."""
     kept, most = case.dynamics.mesh_harmonics, (case.static.positions - 1) // 2
     return None if kept is None else min(kept, most)
+
+
+def _balance(case: Any) -> dict[str, Any]:
+    """Teeth that part as a planar set asks for them by its responses, with the lines that a gearbox takes at most."""
+    if case.train != "planar" or case.planar.response is None:
+        return {}
+    response, given = case.planar.response, case.planar.mesh_stiffness is not None
+    turns = response.carrier_harmonics if given else response.side_bands
+    harmonics = 1 if given else _mesh_harmonics(case) or 1
+    return {"harmonics": harmonics, "side_bands": min(turns, _MOST_TURNS), "back_flanks": case.planar.back_flanks}
 
 
 def _teeth_tables(given: Mapping[str, Any], torque: str) -> dict[str, Any]:
@@ -333,6 +344,7 @@ def _left_out(case: Any, given: Mapping[str, Any]) -> Iterator[Finding]:
             for key in ("form", "points", "microphone", "published", "measured", "support", "structure")
         },
         **{f"planar.{key}": key in planar for key in _OF_PLANAR},
+        "planar.back_flanks": "back_flanks" in planar and "response" not in planar,
         # meshes of a given stiffness take the play along, teeth have their own
         "planar.line_backlash": "line_backlash" in planar and "mesh_stiffness" not in planar,
         "planet.bearing_clearance": bool(given.get("planet", {}).get("bearing_clearance")),
