@@ -33,7 +33,9 @@ def test_runs_as_a_user_runs_it(case, tmp_path):
     assert [one for one in manifest["findings"] if one["severity"] == "fault"] == []
     for stage in manifest["timings"].keys() - {"pictures"}:
         with read_dataset(tmp_path / "run" / f"{stage}.nc") as data:
-            numbers = [one.values for one in data.data_vars.values() if one.dtype.kind == "f"]
-            assert numbers and not any(np.isinf(values).any() for values in numbers)
+            numbers = [name for name, one in data.data_vars.items() if one.dtype.kind == "f"]
+            # lives of what no load harms have no end, and say so
+            ended = [name for name in numbers if "infinite" not in data[name].attrs.get("long_name", "")]
+            assert ended and [name for name in ended if np.isinf(data[name]).any()] == []
     again = femgear("report", tmp_path / "run")
     assert again.returncode == 0, again.stderr
