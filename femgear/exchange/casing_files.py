@@ -25,7 +25,15 @@ import numpy as np
 
 from femgear.exchange.casing_modes import CasingModes, modes_of_matrices, modes_of_universal_file
 from femgear.exchange.nastran_matrices import dmig_matrices, op4_matrices
-from femgear.exchange.node_tables import Node, feet_of, file_in_refusals, foreign_refusals, read_nodes, require
+from femgear.exchange.node_tables import (
+    Node,
+    feet_of,
+    file_in_refusals,
+    foreign_refusals,
+    read_nodes,
+    refuse_output2,
+    require,
+)
 from femgear.findings import Finding
 from femgear.housing.two_way.structure import ARRAY_NAMES, FixedStructure, from_arrays
 
@@ -98,6 +106,7 @@ def read_casing(
     kind = path.suffix.lower()
     with file_in_refusals(path):
         names = ", ".join(UNITS)
+        refuse_output2(path)
         require("no such units", units in UNITS, code="E-CHOICE", key="units", value=units, limit=names)
         require(
             "no such file, or no kind of file that holds a casing",

@@ -56,6 +56,17 @@ def require(message: str, ok: bool, **words: Any) -> None:
         raise CaseError(message, **words)
 
 
+def refuse_output2(path: Path) -> None:
+    """Refuse (`CaseError`, E-FILE) results of Nastran in OUTPUT2, whose records differ by program and version."""
+    require(
+        "a file in OUTPUT2 is binary in a form of the program that wrote it, and is not read",
+        path.suffix.lower() != ".op2",
+        code="E-FILE",
+        limit="matrices in .pch or .op4, modes in .uff or .unv",
+        remedy="write the matrices to the punch file, EXTSEOUT(STIFFNESS,MASS,DMIGPCH), or by OUTPUT4 as text",
+    )
+
+
 @contextmanager
 def file_in_refusals(path: Path) -> Iterator[None]:
     """Name the file in the refusals of the block; what a library says of a damaged one is E-FILE."""

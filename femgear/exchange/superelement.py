@@ -25,7 +25,7 @@ from scipy import linalg
 from femgear.errors import CaseError
 from femgear.exchange.casing_files import UNITS, check_array_size
 from femgear.exchange.nastran_matrices import dmig_matrices, op4_matrices
-from femgear.exchange.node_tables import Node, file_in_refusals, foreign_refusals, read_nodes
+from femgear.exchange.node_tables import Node, file_in_refusals, foreign_refusals, read_nodes, refuse_output2
 from femgear.fe.beam import rigid_link
 
 SUPERELEMENT_ROLES = {"seat": True, "foot": True, "sensor": True}
@@ -147,6 +147,7 @@ def read_superelement(
     """
     kind = path.suffix.lower()
     with file_in_refusals(path):
+        refuse_output2(path)
         if not path.is_file() or kind not in _KINDS:
             raise CaseError(
                 "no such file, or no kind of file that holds stiffness and mass",

@@ -11,6 +11,7 @@ from pyNastran.op4.op4 import OP4
 from scipy.linalg import eigh
 
 from femgear.errors import CaseError
+from femgear.exchange.casing_files import read_casing
 from femgear.exchange.superelement import free_body_problems, modal_body, read_superelement
 
 SEAT, FOOT = (3e8, 3e8, 5e8, 7e4, 7e4, 9e4), (4e8, 6e8, 2e8)
@@ -267,3 +268,14 @@ def test_nodes_have_places_and_roles_of_a_superelement(tmp_path):
     (tmp_path / "nodes.csv").write_text(text.replace("foot right,", "ring,"))
     with pytest.raises(CaseError, match="seat NAME, foot NAME or sensor NAME"):
         read_superelement(tmp_path / "casing.npz", tmp_path / "nodes.csv")
+
+
+def test_results_in_output2_are_refused_with_what_to_write_instead(tmp_path):
+    path, nodes = tmp_path / "casing.op2", tmp_path / "nodes.csv"
+    path.write_bytes(b"\x04\x00\x00\x00" * 9)
+    known = {"nodes": nodes, "direction": (0.9, 0.4), "pitch_radius": 0.08, "max_diameter": 4}
+    for read in (lambda: read_superelement(path, nodes), lambda: read_casing(path, **known)):
+        with pytest.raises(CaseError, match="OUTPUT2") as caught:
+            read()
+        assert (caught.value.code, caught.value.file) == ("E-FILE", str(path))
+        assert "DMIGPCH" in caught.value.remedy
