@@ -95,6 +95,8 @@ Whole = Annotated[int, Parameter(converter=_convert_whole)]
 
 _SILENCE = 10.0
 """Longest time without a line where standard error is a file or a pipe [s]."""
+_BRIEF, _LEAST_ROWS = 40, 1
+"""Lines that a run prints of its tables, and rows that are left of the longest one."""
 
 
 class Progress:
@@ -175,6 +177,27 @@ def _load_xarray() -> None:
 
 def _print(blocks) -> None:
     """Print blocks of `femgear.report.page` as tables on standard output."""
+    sys.stdout.write(_as_text(blocks))
+
+
+def _print_briefly(blocks) -> None:
+    """Print blocks in `_BRIEF` lines, if that leaves `_LEAST_ROWS` of the longest table, whose last rows go."""
+    from dataclasses import replace
+
+    from femgear.report.tables import merged
+
+    blocks = [replace(block, rows=tuple(merged(block.rows))) for block in blocks]
+    longest = max(range(len(blocks)), key=lambda number: len(blocks[number].rows))
+    whole = blocks[longest]
+    while (text := _as_text(blocks)).count("\n") > _BRIEF and len(blocks[longest].rows) > _LEAST_ROWS:
+        rows = blocks[longest].rows[:-1]
+        more = f"{len(whole.rows) - len(rows)} more by --verbose"
+        blocks[longest] = replace(whole, rows=rows, notes=(more, *whole.notes))
+    sys.stdout.write(text)
+
+
+def _as_text(blocks) -> str:
+    """Write blocks of `femgear.report.page` as tables, as wide as the terminal, or in 120 columns."""
     from rich import box
     from rich.console import Console
     from rich.table import Table
@@ -184,21 +207,23 @@ def _print(blocks) -> None:
     console = Console(markup=False, highlight=False, emoji=False)
     if not console.is_terminal:
         console.width = 120
-    for block in blocks:
-        console.print(f"\n{printable(block.title)}")
-        rows = [[printable(cell) for cell in row] for row in merged(block.rows)]
-        for columns in _fitting(block.header, rows, console.width) if rows else ():
-            table = Table(box=box.SIMPLE_HEAD if block.header else None, show_header=bool(block.header))
-            for index, name, least in columns:
-                side = "right" if index and block.header else "left"
-                # numbers stay whole, texts break between words
-                whole = not any(" " in row[index] for row in rows)
-                table.add_column(name, justify=side, overflow="fold", no_wrap=whole, min_width=least)
-            for row in rows:
-                table.add_row(*(row[index] for index, *_ in columns))
-            console.print(table)
-        for note in block.notes:
-            console.print(f"  {printable(note)}")
+    with console.capture() as captured:
+        for block in blocks:
+            console.print(f"\n{printable(block.title)}")
+            rows = [[printable(cell) for cell in row] for row in merged(block.rows)]
+            for columns in _fitting(block.header, rows, console.width) if rows else ():
+                table = Table(box=box.SIMPLE_HEAD if block.header else None, show_header=bool(block.header))
+                for index, name, least in columns:
+                    side = "right" if index and block.header else "left"
+                    # numbers stay whole, texts break between words
+                    whole = not any(" " in row[index] for row in rows)
+                    table.add_column(name, justify=side, overflow="fold", no_wrap=whole, min_width=least)
+                for row in rows:
+                    table.add_row(*(row[index] for index, *_ in columns))
+                console.print(table)
+            for note in block.notes:
+                console.print(f"  {printable(note)}")
+    return captured.get()
 
 
 def _fitting(header: Sequence[str], rows: Sequence[Sequence[str]], width: int) -> list[list[tuple[int, str, int]]]:
@@ -413,7 +438,10 @@ def run(
                 """Print what was found, before anything is drawn."""
                 with progress.aside():
                     if not json:
-                        _print(train.describe_results(results) if verbose else train.describe_briefly(results, only))
+                        if verbose:
+                            _print(train.describe_results(results))
+                        else:
+                            _print_briefly(train.describe_briefly(results, only))
                     _warn(train.result_warnings(results))
                     sys.stdout.flush()
                 if pictures:

@@ -353,3 +353,27 @@ def test_progress_is_never_silent_for_long_in_a_file(monkeypatch, capsys):
     lines = capsys.readouterr().err.splitlines()
     assert lines[0] == "pictures" and len(lines) > 2
     assert all(line.startswith("pictures, 3 of 11, ") and line.endswith(" s") for line in lines[1:])
+
+
+def test_a_run_is_told_in_few_lines_of_80_columns(monkeypatch, capsys):
+    """The last rows of the longest table go; a note tells how many, before the other notes."""
+
+    class Narrow(Console):
+        is_terminal = True
+
+        def __init__(self, **options):
+            super().__init__(**options, width=80)
+
+    monkeypatch.setattr("rich.console.Console", Narrow)
+    answers = tuple((f"question {i}", "a long answer " * 6) for i in range(5))
+    numbers = tuple((f"row {i}", f"number {i * i} of a run with its place, " * 3) for i in range(30))
+    blocks = [Block("answers", rows=answers), Block("numbers", rows=numbers, notes=("a note",))]
+    cli._print_briefly(blocks)
+    printed = capsys.readouterr().out.splitlines()
+    assert len(printed) <= 40 and max(map(len, printed)) <= 80
+    left = sum("row " in line for line in printed)
+    at = next(i for i, line in enumerate(printed) if "more by --verbose" in line)
+    assert 1 < left < 30 and printed[at] == f"  {30 - left} more by --verbose" and "a note" in printed[at + 1]
+    assert "question 4" in "".join(printed)
+    cli._print_briefly([Block("numbers", rows=numbers[:3])])
+    assert "--verbose" not in capsys.readouterr().out

@@ -95,7 +95,7 @@ def describe_judgements(sentence: str, judgements: Sequence[Judgement]) -> tuple
     if not judgements:
         return ()
     rows = tuple(
-        (judgement.question, judgement.words, ": ".join(filter(None, (judgement.answer, judgement.limit))))
+        (judgement.words, f"{judgement.question} {': '.join(filter(None, (judgement.answer, judgement.limit)))}")
         for judgement in judgements
     )
     return (Block(sentence or "Summary", rows=rows),)

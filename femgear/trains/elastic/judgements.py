@@ -108,4 +108,5 @@ def _resonance(runup: Any) -> str:
     mode, harmonic = int(runup["mode"].values[at]), int(runup["mesh_harmonic"].values[at])
     speed, side = float(runup["operating_speed"].values[at]), "below" if distance[at] < 0.0 else "above"
     meeting = f"mode {mode} meets mesh harmonic {harmonic}, {abs(distance[at]):.1f} % {side} {speed:,.4g} rpm"
-    return f"{meeting}: {min(makes[at] ** 2, 1.0):.0%} of the power alone"
+    share = float(makes[at]) ** 2
+    return f"{meeting}: alone {f'{share:.0%} of the power' if share < 1.0 else 'as loud as all'}"
