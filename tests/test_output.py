@@ -365,7 +365,7 @@ def test_a_run_is_told_in_few_lines_of_80_columns(monkeypatch, capsys):
             super().__init__(**options, width=80)
 
     monkeypatch.setattr("rich.console.Console", Narrow)
-    answers = tuple((f"question {i}", "a long answer " * 6) for i in range(5))
+    answers = tuple((f"question {i}", f"a long answer {i * i} " * 6) for i in range(5))
     numbers = tuple((f"row {i}", f"number {i * i} of a run with its place, " * 3) for i in range(30))
     blocks = [Block("answers", rows=answers), Block("numbers", rows=numbers, notes=("a note",))]
     cli._print_briefly(blocks)
