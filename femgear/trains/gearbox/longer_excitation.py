@@ -3,7 +3,7 @@
 No share of the upper half of an excitation tells that. Far below the resonance of the teeth both halves are small, and
 what lies beyond makes most of the force. So the longer excitation has twice the frequency, and at least 1.4 times that
 of the modes in which the teeth are strained most, as the excitation of elastic sets does
-(`femgear.trains.elastic.excitation_limit`).
+(`femgear.trains.elastic.excitation_limit`). Where the case limits the mesh harmonics it has twice as many.
 """
 
 from __future__ import annotations
@@ -45,14 +45,15 @@ def longer_excitation(response: GearboxResponse, *, steps: Steps | None = None) 
     -------
     GearboxResponse or None
         At the speed with the largest force of every stage, and at the loudest one of the `SENSORS_JUDGED` loudest
-        sensors; None where nothing excites, or where only the longer excitation meets an undamped resonance.
+        sensors; None where nothing excites, or where the longer one alone is not solved.
     """
     found, case = response.deflection, response.deflection.model.case
     if not response.stages:
         return None
-    end = min(_HIGHEST, max(2.0 * _end(response), _BEYOND_TEETH * teeth_frequency(found)))
+    end = min(_HIGHEST, max(2.0 * response.up_to, _BEYOND_TEETH * teeth_frequency(found)))
+    most = case.dynamics.mesh_harmonics and 2 * case.dynamics.mesh_harmonics
     dynamics = case.dynamics.model_copy(
-        update={"up_to": end, "mesh_harmonics": None, "tolerance": max(_TOLERANCE, case.dynamics.tolerance)}
+        update={"up_to": end, "mesh_harmonics": most, "tolerance": max(_TOLERANCE, case.dynamics.tolerance)}
     )
     model = replace(found.model, case=case.model_copy(update={"dynamics": dynamics}))
     longer = replace(found, model=model)
@@ -60,16 +61,6 @@ def longer_excitation(response: GearboxResponse, *, steps: Steps | None = None) 
         return solve_gearbox_response(longer, response.speed[_speeds_judged(response)], steps=steps)
     except ConvergenceError:
         return None
-
-
-def _end(response: GearboxResponse) -> float:
-    """Frequency at which the excitation of a response ends at its highest speed [Hz]."""
-    model = response.deflection.model
-    if model.case.dynamics.mesh_harmonics is None:
-        return response.up_to
-    factor = response.speed.max() / abs(model.flow.speed[response.reference])
-    fastest = factor * max(model.flow.mesh_frequency.values())
-    return min(response.up_to, model.case.dynamics.mesh_harmonics * fastest)
 
 
 def _speeds_judged(response: GearboxResponse) -> np.ndarray:

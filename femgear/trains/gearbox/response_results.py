@@ -338,8 +338,9 @@ def _short_excitation(data: xr.Dataset, number: int, stage: str) -> Iterator[Fin
     """
     if "longer_dynamic_factor" not in data:
         if math.isnan(data.attrs.get("compared_to", 0.0)):
-            text = f"a longer excitation than to {_reach(data)} has no solution: what it changes is not known"
-            yield Finding("W-TAIL", "modes.damping_ratio", text, remedy="give the modes some damping")
+            key, remedy = _end_of_excitation(data)
+            text = f"what a longer excitation than to {_reach(data)} changes is not known: it did not converge"
+            yield Finding("W-TAIL", key, text, remedy=remedy)
         return
     factor, longer = (data[name].values[:, number] for name in ("dynamic_factor", "longer_dynamic_factor"))
     change = np.nan_to_num(np.abs(longer / factor - 1.0))
@@ -405,7 +406,8 @@ def _reach(data: xr.Dataset) -> str:
 
 def _compared_to(data: xr.Dataset) -> str:
     """Words for the end of the longer excitation."""
-    return f"{1e-3 * data.attrs['compared_to']:.3g} kHz"
+    most = 2 * int(data.attrs.get("most_harmonics", 0))
+    return f"{1e-3 * data.attrs['compared_to']:.3g} kHz" + (f", at most {most} mesh harmonics," if most else "")
 
 
 def _cross_finding(data: xr.Dataset) -> Finding:

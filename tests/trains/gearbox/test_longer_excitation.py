@@ -63,8 +63,7 @@ def test_that_of_a_run_up_is_solved_where_its_force_is_largest():
     assert longer.up_to == pytest.approx(4.0 * frequency())
 
 
-def test_an_excitation_of_few_harmonics_ends_with_them():
+def test_an_excitation_of_few_harmonics_is_compared_with_one_of_twice_as_many():
     speed = [0.1 * 2.0 * math.pi * frequency() / 24.0]
     longer = longer_excitation(solve_gearbox_response(two_discs(mesh_harmonics=8, up_to="200 kHz"), speed))
-    assert longer is not None and longer.up_to == pytest.approx(1.6 * frequency())
-    assert longer.stages[0].harmonics.tolist() == [16]
+    assert longer is not None and longer.stages[0].harmonics.tolist() == [16]

@@ -167,7 +167,7 @@ def test_forces_that_a_longer_excitation_changes_are_told():
     assert not [*gearbox_response_warnings(small_response(longer_dynamic_factor=small))]
     former = small_response().drop_vars("longer_dynamic_factor")
     (unsolved,) = gearbox_response_warnings(former.assign_attrs(compared_to=np.nan))
-    assert (unsolved.code, unsolved.key) == ("W-TAIL", "modes.damping_ratio")
+    assert unsolved.code == "W-TAIL" and unsolved.text.endswith("it did not converge")
     del former.attrs["compared_to"]
     assert not [*gearbox_response_warnings(former)]
 
