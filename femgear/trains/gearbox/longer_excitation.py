@@ -76,7 +76,18 @@ def _speeds_judged(response: GearboxResponse) -> np.ndarray:
 def teeth_frequency(found: Deflection) -> float:
     """Highest frequency of the modes in which the meshes of an exciting stage have most of their strain energy [Hz].
 
-    Of the gearbox about its loaded state; elastic rings and carriers are rigid here.
+    Of the gearbox about its loaded state; elastic rings and carriers are rigid here. Modes have unit mass, so that the
+    strain energy of a mode is half of its angular frequency squared, of which the meshes of a stage have a share.
+
+    Parameters
+    ----------
+    found : Deflection
+        Loaded state, whose stages with teeth or contact ratios excite.
+
+    Returns
+    -------
+    float
+        Zero where nothing excites.
     """
     assembly, system, stiffness = linear_system(found)
     still = replace(system, gyroscopic=None, load=np.zeros(len(system.dofs)))
