@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from recorded_signals import CASE, COARSE, HEALTHY, RATE, computed_lines, recording, write_columns
 
-from femgear import causes, read_case
+from femgear import causes, read_case, solve
 from femgear.causes import CAUSES, describe_causes, rank_causes
 from femgear.errors import CaseError
 from femgear.housing.orders import FOREIGN
@@ -122,6 +122,24 @@ def test_lines_at_many_turns_of_a_part_that_is_heard_are_of_this_set(tmp_path):
     alone = HEALTHY | {337.5: 0.2}
     verdict = verdict_of(tmp_path, alone, alone.values())
     assert not any(causes._from_this_set(line, verdict) for line in verdict.lines)
+
+
+@pytest.mark.slow
+def test_a_crack_that_made_a_recording_is_found_with_its_depth(tmp_path, monkeypatch):
+    """In another planet, tooth and grid than those with which causes are computed; of these the crack alone."""
+    monkeypatch.setattr(causes, "CAUSES", ())
+    monkeypatch.setattr(causes, "_FAULT_SIZES", {"crack": causes._FAULT_SIZES["crack"]})
+    crack = {"kind": "crack", "planet": 2, "tooth": 5, "flank": "sun side", "depth": "1 mm"}
+    lines = solve(with_values(read_case(CASE), COARSE | {"planet.fault": [crack]}), "housing")["housing"].exact
+    value = lines.acceleration[0]
+    kept = (lines.order > 0) & (np.abs(value) > 1e-3 * np.abs(value).max())
+    signal, pulses, _ = recording(lines.order[kept], value[kept], seconds=30.0, noise=3e-4)
+    columns = np.arange(len(signal)) / RATE, signal, pulses
+    path = write_columns(tmp_path / "a.csv", "time [s];acc [m/s^2];tacho [V]\n", columns)
+    verdict = measured_verdict(read_case(CASE), path, Recording(pulses="tacho"), LineSearch(threshold=-50.0))
+    (ranked,) = rank_causes(read_case(CASE), verdict)
+    assert ranked.size == pytest.approx(1e-3, rel=0.05)
+    assert ranked.explained > 0.98
 
 
 @pytest.mark.slow
