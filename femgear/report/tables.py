@@ -149,6 +149,11 @@ class Marks:
         return text + "".join(self._used[code] for code in raised)
 
     @property
+    def codes(self) -> tuple[str, ...]:
+        """The marks that were used with their codes, where there is no room for `notes`."""
+        return tuple(f"{mark} {code}" for code, mark in self._used.items())
+
+    @property
     def notes(self) -> tuple[str, ...]:
         """What the marks that were used mean."""
         return tuple(

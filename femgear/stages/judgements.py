@@ -366,24 +366,27 @@ def judge_smoothness(answer: str, results: Any, stages: Sequence[str]) -> Judgem
     Parameters
     ----------
     answer : str
-        Transmission error and dynamic factors, in figures.
+        Transmission error and dynamic factors, in figures; empty where none is known.
     results : Results
     stages : sequence of str
         Stages that the train has with motion; where a run has none of them nothing is judged.
     """
     present = [stage for stage in stages if stage in results.stages]
     if not present:
-        return Judgement(SMOOTH, "open", "not known" if answer == "-" else answer, "no motion was computed")
+        return Judgement(SMOOTH, "open", answer or "not known", "no motion was computed")
     against = list(dict.fromkeys(_against(results, present)))
     if not against and any(finding.code == "W-TAIL" and finding.severity == DOUBT for finding in results.findings):
-        return Judgement(SMOOTH, "look", answer, "mesh forces are cut short")
+        return _smoothness("look", answer, "mesh forces are cut short")
     if not against:
         judged = any("stable" in results[stage] for stage in present)
         words = "teeth stay in contact, motions are stable" if judged else "teeth stay in contact"
-        return Judgement(SMOOTH, "good", answer, words)
-    if answer == "-":
-        return Judgement(SMOOTH, "look", ", ".join(against), "", f"At some speeds {' and '.join(against)}")
-    return Judgement(SMOOTH, "look", answer, ", ".join(against), f"At some speeds {' and '.join(against)}")
+        return _smoothness("good", answer, words)
+    return _smoothness("look", answer, ", ".join(against), f"At some speeds {' and '.join(against)}")
+
+
+def _smoothness(state: State, answer: str, words: str, sentence: str = "") -> Judgement:
+    """Judge the run in figures and words, or in words alone."""
+    return Judgement(SMOOTH, state, answer or words, words if answer else "", sentence)
 
 
 def _against(results: Any, stages: Sequence[str]) -> Iterator[str]:
@@ -414,7 +417,7 @@ class LevelMargin:
     speed : float
         [rpm]
     place : str
-        Sensor or microphone.
+        Sensor or microphone, and by which excitation where it is not that of the case.
     """
 
     decibels: float
@@ -440,6 +443,7 @@ def judge_noise(
     resonance: str = "",
     open_words: str = _CLEAR,
     margins: Sequence[LevelMargin] = (),
+    doubts: str = "",
 ) -> Judgement:
     """Judge how loud it is: by the limits of the case, else by resonances at speeds of operation.
 
@@ -455,15 +459,22 @@ def judge_noise(
         What to say where there is neither a limit nor a resonance.
     margins : sequence of LevelMargin
         Of the levels that have a limit.
+    doubts : str
+        Doubts of the levels, in words: below a limit such levels deserve a look.
     """
+
+    def doubted(limit: str) -> str:
+        return "; ".join(filter(None, (limit, doubts)))
+
     if margins:
         worst = max(margins, key=lambda margin: margin.decibels)
         if worst.decibels > 0.0:
-            return Judgement(QUIET, "bad", answer, worst.words, f"{sentence}. Too loud: {worst.words}")
-        return Judgement(QUIET, "look" if resonance else "good", answer, resonance or worst.words, sentence)
+            return Judgement(QUIET, "bad", answer, doubted(worst.words), f"{sentence}. Too loud: {worst.words}")
+        state: State = "look" if resonance or doubts else "good"
+        return Judgement(QUIET, state, answer, doubted(resonance or worst.words), sentence)
     if resonance:
-        return Judgement(QUIET, "look", answer, resonance, sentence)
-    return Judgement(QUIET, "open", answer, open_words, sentence)
+        return Judgement(QUIET, "look", answer, doubted(resonance), sentence)
+    return Judgement(QUIET, "open", answer, doubted(open_words), sentence)
 
 
 def judge_numbers(findings: Sequence[Finding], complete: bool) -> Judgement:

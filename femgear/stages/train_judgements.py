@@ -114,7 +114,7 @@ def _motion(results: Any, dynamic: np.ndarray | None) -> str:
         dynamic = computed_dynamic_factor(results.dynamics, len(kinds))
     if dynamic is not None:
         parts.append(f"K_v {_joined(dynamic, '.2f')}")
-    text = ", ".join(parts) or "-"
+    text = ", ".join(parts)
     return f"{text} ({', '.join(kinds)})" if " and " in text and kinds else text
 
 

@@ -182,24 +182,24 @@ class Files(dict):
 
 def test_a_run_is_smooth_unless_teeth_part_or_motions_grow():
     smooth = Files(dynamics=xr.Dataset({"drive_contact": ("speed", [1.0, 1.0]), "stable": ("speed", [1, 1])}))
-    assert judge_smoothness("-", smooth, ("dynamics",)).state == "good"
-    assert judge_smoothness("-", smooth, ("branch",)).state == "open"
+    assert judge_smoothness("", smooth, ("dynamics",)).state == "good"
+    assert judge_smoothness("", smooth, ("branch",)).state == "open"
     parted = Files(branch=xr.Dataset({"drive_contact": ("point", [1.0, 0.9]), "stable": ("point", [1, 0])}))
     judgement = judge_smoothness("K_v 1.2", parted, ("dynamics", "branch"))
     assert judgement.state == "look" and judgement.limit == "teeth part, motions are not stable"
     # what is not determined is not judged
-    assert judge_smoothness("-", Files(branch=xr.Dataset({"stable": ("point", [1, -1])})), ("branch",)).state == "good"
+    assert judge_smoothness("", Files(branch=xr.Dataset({"stable": ("point", [1, -1])})), ("branch",)).state == "good"
     back = Files(branch=xr.Dataset({"back_contact": ("point", [0.0, 0.1])}))
-    assert judge_smoothness("-", back, ("branch",)).answer == "teeth press on their back flanks"
+    assert judge_smoothness("", back, ("branch",)).answer == "teeth press on their back flanks"
     pulled = Files(dynamics=xr.Dataset({"level": ("speed", np.ones(2))}))
     pulled.findings = (Finding("W-PULL", "", "it pulls"),)
-    assert judge_smoothness("-", pulled, ("dynamics",)).answer == "teeth part"
+    assert judge_smoothness("", pulled, ("dynamics",)).answer == "teeth part"
     pulled.findings = (Finding("W-TAIL", "", "it ends short", severity=DOUBT),)
-    short = judge_smoothness("-", pulled, ("dynamics",))
-    assert (short.state, short.limit) == ("look", "mesh forces are cut short")
+    short = judge_smoothness("", pulled, ("dynamics",))
+    assert (short.state, short.answer) == ("look", "mesh forces are cut short")
     # of motions whose stability nothing tells nothing is said
     pulled.findings = ()
-    assert judge_smoothness("-", pulled, ("dynamics",)).limit == "teeth stay in contact"
+    assert judge_smoothness("", pulled, ("dynamics",)).answer == "teeth stay in contact"
 
 
 def test_a_level_without_a_limit_is_judged_by_resonances_alone():
@@ -213,6 +213,8 @@ def test_a_level_is_judged_by_the_worst_of_its_limits():
     holds = judge_noise("1 m/s²", "so", margins=(below,))
     assert (holds.state, holds.limit) == ("good", "3.0 dB below the limit at foot, 2,000 rpm")
     assert judge_noise("1 m/s²", "so", "mode 3 meets mesh harmonic 2", margins=(below,)).state == "look"
+    doubtful = judge_noise("1 m/s²†", "so", margins=(below,), doubts="† it ends short")
+    assert (doubtful.state, doubtful.limit) == ("look", f"{holds.limit}; † it ends short")
     fails = judge_noise("1 m/s²", "so", "mode 3 meets mesh harmonic 2", margins=(below, over))
     assert (fails.state, fails.limit) == ("bad", "1.5 dB over the limit at foot, 2,000 rpm")
     assert fails.sentence == "so. Too loud: 1.5 dB over the limit at foot, 2,000 rpm"

@@ -467,7 +467,7 @@ def balance_warnings(data: xr.Dataset) -> Iterator[Finding]:
         tail = float(data["tail"].values[number])
         if tail > _TAIL:
             text = f"{tail:.2g} of the amplitude of {name} is in the upper half of the lines"
-            yield Finding("W-TAIL", "balance.harmonics", text, remedy="more harmonics")
+            yield Finding("W-TAIL", "balance.harmonics", text, remedy="take more harmonics")
     if data.attrs["rigid"]:
         text = (
             f"{data.attrs['rigid']}: elastic in modes and response, rigid where teeth part: sensors on it are left out"

@@ -10,7 +10,7 @@ import numpy as np
 
 from femgear.case.level_limits import limit_at
 from femgear.case.load_spectrum import required_life
-from femgear.report.tables import merged_names
+from femgear.report.tables import Marks, merged_names
 from femgear.stages.judgements import (
     Judgement,
     Least,
@@ -31,9 +31,12 @@ from femgear.stages.key_figures import REFERENCE_ACCELERATION
 from femgear.stages.strength import OF_ROOTS
 from femgear.stages.strength_results import SYMBOLS, taken_as_one
 from femgear.trains.gearbox.mode_words import near_mode
-from femgear.trains.gearbox.response_results import line_origin, main_way
+from femgear.trains.gearbox.response_results import LEVEL_CHANGE_TOLD, OF_BOX_RESPONSE, line_origin, main_way
+from femgear.trains.gearbox.silence import why_silent
 from femgear.trains.gearbox.strength import least_safety
 
+_IDLE = 1e-3
+"""Mean force of a mesh over the largest force of all up to which it carries nothing that a ratio would tell about."""
 _RESPONSES = "dynamics", "runup", "balance", "transient"
 """Stages with motion."""
 
@@ -51,8 +54,7 @@ def gearbox_judgements(results: Any) -> Iterator[Judgement]:
     if "dynamics" in stages and results.dynamics.sizes.get("sensor", 0):
         yield _noise(results)
     else:
-        open_words = "femgear casing CASE gives a gearbox a casing with sensors"
-        yield judge_noise("no sensor in this run", _largest_force(results), open_words=open_words)
+        yield _unheard(results)
     yield judge_numbers(findings, results.manifest.complete)
 
 
@@ -119,7 +121,12 @@ def _motion(results: Any) -> str:
         factors = results.dynamics["dynamic_factor"].values
         if np.isfinite(factors).any():
             parts.append(f"K_v {np.nanmax(factors):.2f}")
-    return ", ".join(parts) or "-"
+    elif "balance" in results.stages:
+        mean, largest = (results.balance[name].values for name in ("mean_force", "largest_force"))
+        carries = mean > _IDLE * largest.max()
+        if carries.any():
+            parts.append(f"largest mesh force {(largest[carries] / mean[carries]).max():.3f} of its mean")
+    return ", ".join(parts)
 
 
 def _largest_force(results: Any) -> str:
@@ -133,13 +140,25 @@ def _largest_force(results: Any) -> str:
     return f"Its mesh forces reach {np.nanmax(factors):.2f} times their mean ({where})"
 
 
+def _unheard(results: Any) -> Judgement:
+    """Say why a gearbox has no level at sensors, and what would give one."""
+    case, forces = results.case, _largest_force(results)
+    if not case.sensor:
+        open_words = "femgear casing CASE gives a gearbox a casing with sensors"
+        return judge_noise("no sensor in this run", forces, open_words=open_words)
+    why = why_silent(case) or "its response was not computed"
+    return judge_noise("no level at its sensors", forces, open_words=why)
+
+
 def _noise(results: Any) -> Judgement:
     """Judge the level at the loudest sensor, with its main line and the way most of it comes by."""
     data, modes = results.dynamics, results.modes if "modes" in results.stages else None
     level = data["level"].values[0]
     sensor = int(level.argmax())
     whole, name, speed = float(level[sensor]), data["sensor"].values[sensor], float(data["speed"].values[0])
-    answer = f"{_level(whole)} at {name}, {speed:,.4g} rpm"
+    marks = Marks(results.findings)
+    size_words = _marked(whole, marks, "dynamics")
+    answer = f"{size_words} at {name}, {speed:,.4g} rpm"
     if not whole > 0.0:
         return judge_noise(answer, "", open_words="nothing excites it")
     size = np.hypot(data["lines_real"].values[0, sensor], data["lines_imag"].values[0, sensor])
@@ -150,21 +169,35 @@ def _noise(results: Any) -> Judgement:
     main = (
         f"{line_origin(data, line)} at {hertz:,.0f} Hz{near} makes {0.5 * (size[line] / whole) ** 2:.0%} of the power"
     )
-    sentence = f"At {speed:,.4g} rpm sensor {name} has {_level(whole)}: {main}"
+    sentence = f"At {speed:,.4g} rpm sensor {name} has {size_words}: {main}"
     if "path_share" in data:
         sentence += f"; most of it comes by {main_way(data, sensor)}"
     if "runup" in results.stages and "level" in results.runup:
-        over = results.runup["level"].values.max(axis=1)
-        at = int(over.argmax())
-        sentence += (
-            f". Loudest of the run-up: {_level(float(over[at]))} at {results.runup['speed'].values[at]:,.0f} rpm"
-        )
+        sentence += f". Loudest of the run-up: {_loudest_of_run_up(results.runup, marks, name)}"
     open_words = "give sensor.level_limit, or femgear compare sets two runs beside one another"
-    return judge_noise(answer, sentence, open_words=open_words, margins=tuple(_margins(results)))
+    doubts = f"doubt{'s' * (len(marks.codes) > 1)}: {', '.join(marks.codes)}" if marks.codes else ""
+    return judge_noise(answer, sentence, open_words=open_words, margins=tuple(_margins(results)), doubts=doubts)
+
+
+def _marked(level: float, marks: Marks, stage: str) -> str:
+    """Write a level of a stage with the marks of its doubts."""
+    return marks(_level(level), "W-EXCITATION", *OF_BOX_RESPONSE, of=(stage,))
+
+
+def _loudest_of_run_up(runup: Any, marks: Marks, known: str) -> str:
+    """Write level and speed where the run-up is loudest, with the sensor where it is not the one that is ``known``."""
+    level = runup["level"].values
+    at, sensor = np.unravel_index(int(level.argmax()), level.shape)
+    name = str(runup["sensor"].values[sensor])
+    where = "" if name == known else f"sensor {name}, "
+    return f"{_marked(float(level[at, sensor]), marks, 'runup')} at {where}{runup['speed'].values[at]:,.0f} rpm"
 
 
 def _margins(results: Any) -> Iterator[LevelMargin]:
-    """Compare levels of operation and of the run-up with the limits of the sensors that have one."""
+    """Compare levels of operation and of the run-up with the limits of the sensors that have one.
+
+    Where a longer excitation makes a level higher that one is compared too.
+    """
     limits = {sensor.name: sensor.level_limit for sensor in results.case.sensor if sensor.level_limit}
     for stage in ("dynamics", "runup"):
         if stage not in results.stages or "level" not in results[stage]:
@@ -172,9 +205,16 @@ def _margins(results: Any) -> Iterator[LevelMargin]:
         speed, names = results[stage]["speed"].values, results[stage]["sensor"].values.tolist()
         # a sensor of a casing from a file that has no node is not heard
         for name, points in ((name, limits[name]) for name in names if name in limits):
-            level = results[stage]["level"].values[:, names.index(name)]
-            over = np.maximum(level, np.finfo(float).tiny) / limit_at(points, speed)
-            yield margin_of_levels(speed, 20.0 * np.log10(over), name)
+            sensor = names.index(name)
+            level = results[stage]["level"].values[:, sensor]
+            over = 20.0 * np.log10(np.maximum(level, np.finfo(float).tiny) / limit_at(points, speed))
+            yield margin_of_levels(speed, over, name)
+            if "level_change" not in results[stage]:
+                continue
+            change = np.nan_to_num(results[stage]["level_change"].values[:, sensor], posinf=0.0, neginf=0.0)
+            higher = change > LEVEL_CHANGE_TOLD
+            if higher.any():
+                yield margin_of_levels(speed[higher], (over + change)[higher], f"{name} with a longer excitation")
 
 
 def _level(level: float) -> str:

@@ -26,7 +26,9 @@ LINES_SHOWN = 12
 """Lines of a sensor in the table."""
 SENSORS_JUDGED = 3
 """Sensors that page one judges, at most: the loudest ones."""
-_CHANGE = 0.5
+OF_BOX_RESPONSE = "W-PULL", "W-TAIL", "W-CROSS", "W-STEPS", "W-RIGID"
+"""Codes of the findings that concern levels and forces at all speeds of a response."""
+LEVEL_CHANGE_TOLD = 0.5
 """Change of a level by a longer excitation that is told [dB]."""
 _FORCE_CHANGE = 0.05
 """Relative change of the largest mesh force by a longer excitation that is told."""
@@ -328,7 +330,7 @@ def _by_longer(found: GearboxResponse, longer: GearboxResponse, moved: dict[str,
 def _end_of_excitation(data: xr.Dataset) -> tuple[str, str]:
     """Entry that ends the excitation, and what to do about it."""
     few = bool(data.attrs.get("most_harmonics"))
-    return ("dynamics.mesh_harmonics", "more of them") if few else ("dynamics.up_to", "a higher frequency")
+    return ("dynamics.mesh_harmonics", "take more of them") if few else ("dynamics.up_to", "take a higher frequency")
 
 
 def _short_excitation(data: xr.Dataset, number: int, stage: str) -> Iterator[Finding]:
@@ -360,7 +362,7 @@ def _level_excitation(data: xr.Dataset) -> Iterator[Finding]:
         return
     change = np.nan_to_num(data["level_change"].values, posinf=0.0, neginf=0.0)
     at, sensor = np.unravel_index(int(np.abs(change).argmax()), change.shape)
-    if abs(change[at, sensor]) > _CHANGE:
+    if abs(change[at, sensor]) > LEVEL_CHANGE_TOLD:
         key, remedy = _end_of_excitation(data)
         text = (
             f"excitation to {_compared_to(data)} in place of {_reach(data)} changes the level of "
@@ -382,7 +384,7 @@ def gearbox_response_warnings(data: xr.Dataset) -> Iterator[Finding]:
         outer = data["outer"].values[:, number]
         if outer.max() > _TAIL:
             text = f"{outer.max():.2g} of the mesh forces of {stage} are at the outermost side bands"
-            yield Finding("W-TAIL", "dynamics.side_bands", text, remedy="more of them")
+            yield Finding("W-TAIL", "dynamics.side_bands", text, remedy="take more of them")
         yield from _short_excitation(data, number, stage)
     yield from _level_excitation(data)
     if "cross_excitation" in data and data["cross_excitation"].max() > _CROSS:

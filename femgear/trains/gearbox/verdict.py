@@ -21,7 +21,7 @@ from femgear.stages.planet_bearings import planet_bearing_rows
 from femgear.trains.gearbox.casing_results import largest_foot_force
 from femgear.trains.gearbox.life import shortest_life
 from femgear.trains.gearbox.mode_words import mesh_lines_and_modes, near_mode, nearest_mode
-from femgear.trains.gearbox.response_results import SENSORS_JUDGED, line_origin, main_way
+from femgear.trains.gearbox.response_results import OF_BOX_RESPONSE, SENSORS_JUDGED, line_origin, main_way
 from femgear.trains.gearbox.strength import smallest_safeties
 from femgear.trains.gearbox.stress import box_reason_rows
 
@@ -29,7 +29,6 @@ _ROUNDING = 1e-9
 """Share of the mesh forces under which the force of a bearing is rounding: planets balance one another."""
 _OF_TEETH = "W-PASSES", "W-DEFLECTION", "W-STIFFNESS", "W-FACE-LOAD", "W-OPEN"
 _OF_BEARINGS = "W-PASSES", "W-DEFLECTION", "W-STIFFNESS", "W-BEARING", "W-PLAY"
-_OF_RESPONSE = "W-PULL", "W-TAIL", "W-CROSS", "W-STEPS", "W-RIGID"
 
 
 def gearbox_verdict(results: Any) -> Iterator[Block]:
@@ -122,7 +121,7 @@ def _level_codes(data: Any, speed: int, sensor: int) -> tuple[str, ...]:
     """Codes of the findings that concern the level of a sensor at a speed, by their numbers."""
     missing = ("W-EXCITATION",) if data.attrs["missing"] else ()
     change = float(data["level_change"].values[speed, sensor]) if "level_change" in data else math.nan
-    return *missing, *(() if math.isnan(change) else doubtful_excitation(change)), *_OF_RESPONSE
+    return *missing, *(() if math.isnan(change) else doubtful_excitation(change)), *OF_BOX_RESPONSE
 
 
 def _judged(data: Any) -> list[int]:
@@ -159,7 +158,7 @@ def _forces(data: Any, name: str, marks: Marks, stage: str) -> Iterator[tuple[st
     if not np.isfinite(factor).any():
         return
     speed, number, _ = np.unravel_index(int(np.nanargmax(factor)), factor.shape)
-    text = marks(f"{np.nanmax(factor):.3f}", "W-EXCITATION", *_OF_RESPONSE, of=(stage,))
+    text = marks(f"{np.nanmax(factor):.3f}", "W-EXCITATION", *OF_BOX_RESPONSE, of=(stage,))
     yield name, f"{text}, {data['stage'].values[number]} at {float(data['speed'].values[speed]):.5g} rpm"
 
 

@@ -1,12 +1,15 @@
 """Judgements of a gearbox: the loudest sensor with line, mode and way, and safeties over all load cases."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
+import xarray as xr
 from casings import answer_in_a_casing
 
 from femgear.case.level_limits import LevelPoint
+from femgear.findings import DOUBT, Finding
 from femgear.stages.judgements import QUIET, SMOOTH, STRONG, SURE
 from femgear.trains.gearbox.judgements import gearbox_judgements
 from femgear.trains.gearbox.mode_words import near_mode
@@ -58,22 +61,81 @@ def test_a_silent_gearbox_is_said_to_be_silent(results):
     assert judged[QUIET].answer.startswith("silence") and judged[QUIET].limit == "nothing excites it"
 
 
-def test_the_worst_sensor_is_judged_by_its_limit(results):
+def with_limit(results, factor: float, change: float = 0.0, findings=()):
+    """Answer to how loud it is, the limit being so many times the loudest level, which a longer excitation changes."""
     sensor = str(results.dynamics["sensor"].values[0])
-    level = results.dynamics["level"].values[:, 0]
     limited = Files(**vars(results))
+    highest = factor * max(float(data["level"].values[:, 0].max()) for data in (results.dynamics, results.runup))
+    entries = ("strength", "pair", "planetary", "operation", "losses")
+    limited.case = SimpleNamespace(
+        **{entry: getattr(results.case, entry) for entry in entries},
+        sensor=(SimpleNamespace(name=sensor, level_limit=(LevelPoint(level=f"{highest:.17g} m/s^2"),)),),
+    )
+    for name in ("dynamics", "runup"):
+        data = results[name]
+        setattr(limited, name, _with(data, level_change=np.full(data["level"].values.shape, change)))
+    limited.findings = findings
+    return {judgement.question: judgement for judgement in gearbox_judgements(limited)}[QUIET]
+
+
+def test_the_worst_sensor_is_judged_by_its_limit(results):
     for factor, state in ((2.0, "good"), (0.5, "bad")):
-        highest = factor * max(float(level.max()), float(results.runup["level"].values[:, 0].max()))
-        limited.case = SimpleNamespace(
-            **{
-                entry: getattr(results.case, entry)
-                for entry in ("strength", "pair", "planetary", "operation", "losses")
-            },
-            sensor=(SimpleNamespace(name=sensor, level_limit=(LevelPoint(level=f"{highest:.17g} m/s^2"),)),),
-        )
-        noise = {judgement.question: judgement for judgement in gearbox_judgements(limited)}[QUIET]
+        noise = with_limit(results, factor)
         assert noise.state == state
-        assert f"6.0 dB {'below' if state == 'good' else 'over'} the limit at {sensor}" in noise.limit
+        assert f"6.0 dB {'below' if state == 'good' else 'over'} the limit at top, " in noise.limit
+
+
+def test_a_level_below_its_limit_deserves_a_look_where_its_excitation_ends_short(results):
+    short = Finding("W-EXCITATION", "dynamics.up_to", "it ends short", severity=DOUBT, stage="dynamics")
+    noise = with_limit(results, 2.0, -2.0, (short,))
+    assert noise.state == "look" and "6.0 dB below the limit at top" in noise.limit
+    assert noise.limit.endswith("; doubt: † W-EXCITATION")
+    # the level of the other stage has no mark
+    assert "dB)† at top" in noise.answer and noise.sentence.count("†") == 1
+    assert with_limit(results, 2.0, 0.0, (replace(short, stage="deflection"),)).state == "good"
+
+
+def test_a_level_that_a_longer_excitation_takes_over_its_limit_does_not_hold(results):
+    noise = with_limit(results, 2.0, 7.0)
+    assert noise.state == "bad" and noise.limit.startswith("1.0 dB over the limit at top with a longer excitation, ")
+
+
+def test_the_loudest_sensor_of_the_run_up_is_named_where_it_is_another_one(results):
+    def sentence(names) -> str:
+        two = Files(**vars(results))
+        level = results.runup["level"].values
+        two.runup = _with(results.runup, level=np.hstack([level, 3.0 * level]), sensor=np.array(names))
+        two.case = results.case.model_copy(update={"sensor": ()})
+        return {judgement.question: judgement for judgement in gearbox_judgements(two)}[QUIET].sentence
+
+    assert " at sensor foot, 9" in sentence(["top", "foot"])
+    assert "Loudest of the run-up" in sentence(["foot", "top"]) and sentence(["foot", "top"]).count("sensor") == 1
+
+
+def test_sensors_of_a_gearbox_without_torque_are_told_why_they_hear_nothing(results):
+    idle = Files(**vars(results))
+    idle.stages = ("deflection", "modes")
+    load = results.case.operation.load_case[0]
+    still = load.model_copy(update={"torque": dict.fromkeys(load.torque, 0.0)})
+    operation = results.case.operation.model_copy(update={"load_case": (still,)})
+    idle.case = results.case.model_copy(update={"operation": operation})
+    noise = {judgement.question: judgement for judgement in gearbox_judgements(idle)}[QUIET]
+    assert noise.answer == "no level at its sensors" and noise.limit == "no stage that excites it carries a torque"
+    idle.case = results.case
+    noise = {judgement.question: judgement for judgement in gearbox_judgements(idle)}[QUIET]
+    assert noise.limit == "its response was not computed"
+    idle.case = results.case.model_copy(update={"sensor": ()})
+    noise = {judgement.question: judgement for judgement in gearbox_judgements(idle)}[QUIET]
+    assert noise.answer == "no sensor in this run"
+
+
+def test_teeth_that_were_looked_at_by_balance_alone_have_their_largest_force(results):
+    rattling = Files(**vars(results))
+    rattling.stages = ("modes", "balance")
+    forces = {"mean_force": [100.0, 50.0, 0.01], "largest_force": [120.0, 75.0, 90.0]}
+    rattling.balance = xr.Dataset({name: ("mesh", values) for name, values in forces.items()})
+    smooth = {judgement.question: judgement for judgement in gearbox_judgements(rattling)}[SMOOTH]
+    assert smooth.answer == "largest mesh force 1.500 of its mean" and smooth.limit == "teeth stay in contact"
 
 
 def _with(data, **values):
