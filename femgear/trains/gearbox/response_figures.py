@@ -10,7 +10,7 @@ import numpy as np
 from femgear.case.level_limits import limit_at
 from femgear.report.style import BLACK, COLOURS, DASHES, GREY, SMALL, label, legend_below, new_figure, rpm, stems
 from femgear.stages.protocol import Drawn, Figures
-from femgear.trains.gearbox.stage_figures import draw_stage_forces
+from femgear.trains.gearbox.stage_figures import draw_stage_forces, end_with_speeds
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -54,10 +54,25 @@ def _log_axis(ax, level: np.ndarray, parts: np.ndarray) -> None:
         ax.set_ylim(max(0.7 * drawn[drawn > 0.0].min(), 10.0**-_DECADES * largest), 1.5 * largest)
 
 
+def _plain_ticks(ax) -> None:
+    """Write the numbers of a logarithmic ordinate without powers, also 2 and 5 where it has less than two decades."""
+    from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
+
+    if ax.get_yscale() != "log":
+        return
+    low, high = ax.get_ylim()
+    plain = FuncFormatter(lambda value, _: f"{value:g}")
+    ax.yaxis.set_major_formatter(plain)
+    few = high < 100.0 * low
+    if few:
+        ax.yaxis.set_minor_locator(LogLocator(subs=(2.0, 5.0)))
+    ax.yaxis.set_minor_formatter(plain if few else NullFormatter())
+
+
 def _mark_operation(ax, data: xr.Dataset, operation: float | None) -> None:
     """Mark the speed of the load case, where the run-up passes it."""
     speed = data["speed"].values
-    ax.set_xlim(speed[0], speed[-1])
+    end_with_speeds(ax, speed)
     if operation is not None and speed[0] <= operation <= speed[-1]:
         ax.axvline(operation, color=BLACK, linewidth=1.2, linestyle=":", label="speed of the load case")
 
@@ -90,6 +105,7 @@ def draw_run_up_levels(
             ax.plot(speed, limit, color=BLACK, linewidth=1.6, linestyle="--", label="limit")
             low, high = ax.get_ylim()
             ax.set_ylim(min(low, 0.7 * limit.min()), max(high, 1.5 * limit.max()))
+        _plain_ticks(ax)
         _mark_operation(ax, runup, operation)
         label(ax, y="level, r.m.s. [m/s²]", title=f"sensor {runup['sensor'].values[sensor]}")
     label(axes[-1], f"speed of {runup.attrs['reference']} [rpm]")
@@ -112,7 +128,7 @@ def draw_run_up_forces(runup: xr.Dataset, operation: float | None = None) -> Fig
             name = f"{stage}, {runup['kind'].values[kind]}" if len(shown) > 1 else str(stage)
             style = {"color": _STAGE_COLOURS[number % len(_STAGE_COLOURS)], "linestyle": DASHES[kind]}
             ax.plot(runup["speed"].values, curves[kind], linewidth=1.7, label=name, **style)
-    ax.set_ylim(bottom=1.0)
+    ax.set_ylim(1.0, ax.get_ylim()[1] + 0.05 * max(ax.get_ylim()[1] - 1.0, 0.0))
     _mark_operation(ax, runup, operation)
     label(ax, f"speed of {runup.attrs['reference']} [rpm]", "largest mesh force over its mean [1]")
     legend_below(figure, ax)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -48,6 +49,16 @@ def draw_stage_energy(modes: xr.Dataset) -> Figure | None:
     return figure
 
 
+def end_with_speeds(ax, speed: np.ndarray) -> None:
+    """Let the abscissa end with the speeds of the curves; a single speed has markers, and a tenth to both sides."""
+    if np.ptp(speed) > 0.0:
+        ax.set_xlim(speed.min(), speed.max())
+        return
+    for line, marker in zip(ax.lines, itertools.cycle("os^Dv"), strict=False):
+        line.set(marker=marker, markersize=7.0)
+    ax.set_xlim(0.9 * speed[0], 1.1 * speed[0])
+
+
 def draw_stage_forces(runup: xr.Dataset) -> Figure | None:
     """Draw the dynamic force of the first mesh of every stage over the speed, by the stage that excites, of runup.nc.
 
@@ -73,7 +84,7 @@ def draw_stage_forces(runup: xr.Dataset) -> Figure | None:
             ax.set_ylim(10.0**-_DECADES * largest, 3.0 * largest)
         words = f"{meshes[mesh]}: at most {largest:.4g} N r.m.s., at {rpm(float(speed[total.argmax()]))}"
         label(ax, y="force [N r.m.s.]", title=words)
-    axes[0].set_xlim(speed.min(), speed.max())
+        end_with_speeds(ax, speed)
     label(axes[-1], f"speed of {runup.attrs['reference']} [rpm]")
     legend_below(figure, axes[0], columns=3)
     return figure

@@ -81,6 +81,32 @@ def test_every_sensor_has_a_chart_with_the_level_and_the_part_of_every_stage():
     assert chart(figure) is not None
 
 
+def test_a_run_up_of_one_speed_has_points():
+    data = response_data(speeds=1)
+    for figure in (draw_run_up_levels(data, 2000.0), draw_run_up_forces(data, 2000.0)):
+        for ax in figure.axes:
+            assert ax.get_xlim() == pytest.approx((1800.0, 2200.0))
+            named = [line for line in ax.lines if line.get_label() != "speed of the load case"]
+            assert named and len({line.get_marker() for line in named} - {"None"}) == len(named)
+            assert all(ax.get_ylim()[0] <= line.get_ydata()[0] < ax.get_ylim()[1] for line in named)
+
+
+def test_levels_over_few_decades_have_plain_numbers():
+    def numbers(largest: float) -> list[str]:
+        data = response_data(sensors=1).isel(stage=[0])
+        data["level"].values[:, 0] = data["level_of_stage"].values[:, 0, 0] = np.geomspace(2.0, largest, 5)
+        figure = draw_run_up_levels(data)
+        figure.draw_without_rendering()
+        low, high = figure.axes[0].get_ylim()
+        axis = figure.axes[0].yaxis
+        ticks = zip(axis.get_ticklocs(minor=False), axis.get_majorticklabels(), strict=True)
+        small = zip(axis.get_ticklocs(minor=True), axis.get_minorticklabels(), strict=True)
+        return [text.get_text() for place, text in (*ticks, *small) if low <= place <= high and text.get_text()]
+
+    assert numbers(60.0) == ["10", "2", "5", "20", "50"]
+    assert numbers(6000.0) == ["10", "100", "1000"]
+
+
 def test_the_speed_of_the_load_case_is_marked_where_the_run_up_passes_it():
     names = {text.get_text() for text in draw_run_up_levels(response_data(), 2000.0).legends[0].get_texts()}
     assert names == {"all stages", *STAGES, "speed of the load case"}

@@ -64,3 +64,11 @@ def test_the_first_mesh_of_every_stage_has_a_panel_with_a_curve_of_every_stage()
 
 def test_a_stage_that_excites_alone_has_no_picture_of_forces():
     assert draw_stage_forces(forces_data().drop_vars("mesh_force_by_stage")) is None
+
+
+def test_a_run_up_of_one_speed_has_markers_and_an_axis_with_a_width():
+    ax = draw_stage_forces(forces_data().isel(speed=[1])).axes[0]
+    assert ax.get_xlim() == pytest.approx((180.0, 220.0))
+    assert {line.get_marker() for line in ax.lines} == {"o", "s", "^"}
+    several = draw_stage_forces(forces_data()).axes[0]
+    assert several.get_xlim() == (100.0, 300.0) and {line.get_marker() for line in several.lines} == {"None"}
