@@ -356,6 +356,8 @@ def refuse_other_files(files: Iterable[str | os.PathLike], name: str, sha256: st
 def input_checksum(path: str | os.PathLike) -> str:
     """Compute the SHA-256 of a file, as hexadecimal text. CaseError: it cannot be read (E-FILE)."""
     name = os.fsdecode(path)
+    if os.path.isdir(path):
+        raise CaseError("this is a folder", code="E-FILE", file=name, remedy="name a file in it")
     try:
         if not os.path.isfile(path):
             raise FileNotFoundError(0, "no such file")

@@ -14,6 +14,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
+from zipfile import BadZipFile
 
 import numpy as np
 
@@ -78,15 +79,20 @@ def file_in_refusals(path: Path) -> Iterator[None]:
 
 
 @contextmanager
-def foreign_refusals(words: str) -> Iterator[None]:
-    """Turn what a library says of a damaged file into E-FILE."""
+def foreign_refusals(words: str, key: str = "file") -> Iterator[None]:
+    """Turn what a library says of a damaged file into E-FILE, under the key of the file."""
     try:
         yield
     except FemgearError:
         raise
     except Exception as error:
-        text = " ".join(str(error).split())[:200]
-        raise CaseError(f"no {words} that can be read: {text}", code="E-FILE", limit=words) from error
+        text, remedy = " ".join(str(error).split())[:200], "export the file again, and name that one"
+        if isinstance(error, UnicodeDecodeError):
+            text, remedy = "it is not text in UTF-8", "save the file as text in UTF-8"
+        elif isinstance(error, BadZipFile):
+            text, remedy = "it is no archive, or is damaged", "write it with numpy.savez, and name that one"
+        message = f"no {words} that can be read: {text}"
+        raise CaseError(message, code="E-FILE", key=key, limit=words, remedy=remedy) from error
 
 
 def read_nodes(path: Path, roles: Mapping[str, bool] = CASING_ROLES) -> tuple[Node, ...]:
@@ -95,7 +101,7 @@ def read_nodes(path: Path, roles: Mapping[str, bool] = CASING_ROLES) -> tuple[No
     CaseError: E-FILE, E-KEY-MISSING (columns), E-CHOICE (roles, directions), E-DUPLICATE (nodes).
     """
     with file_in_refusals(path):
-        with foreign_refusals("table of nodes (CSV)"), open(path, newline="", encoding="utf-8-sig") as stream:
+        with foreign_refusals("table of nodes (CSV)", "nodes"), open(path, newline="", encoding="utf-8-sig") as stream:
             reader = csv.DictReader(stream)
             rows, columns = list(reader), list(reader.fieldnames or ())
         require(

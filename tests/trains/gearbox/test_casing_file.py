@@ -363,6 +363,32 @@ def test_files_are_named_by_their_entries(tmp_path):
     assert [one.key for one in error.value.problems] == ["casing.mass", "casing.nodes", "casing.foot[0].position"]
 
 
+@pytest.mark.parametrize(
+    ("entry", "content", "words"),
+    [
+        ("nodes", "node,role".encode("utf-16"), "not text in UTF-8"),
+        ("file", b"", "no archive"),
+        ("file", bytes(range(256)), "no archive"),
+    ],
+)
+def test_damaged_files_are_named_with_a_remedy(tmp_path, entry, content, words):
+    tables = box(tmp_path, casing_paths(SEAT, FOOT))
+    (tmp_path / tables["casing"][entry]).write_bytes(content)
+    with pytest.raises(CaseError) as error:
+        casing_element(read(tmp_path, tables))
+    assert (error.value.code, error.value.key) == ("E-FILE", f"casing.{entry}")
+    assert words in error.value.message and error.value.remedy
+
+
+def test_a_folder_is_no_file_of_a_casing(tmp_path):
+    tables = box(tmp_path, casing_paths(SEAT, FOOT))
+    (tmp_path / "folder").mkdir()
+    tables["casing"]["file"] = "folder"
+    with pytest.raises(CaseError) as error:
+        read(tmp_path, tables)
+    assert (error.value.key, error.value.message) == ("casing.file", "this is a folder")
+
+
 def test_a_limit_of_frequency_leaves_what_the_interface_gives_way(tmp_path):
     tables = box(tmp_path, casing_paths(SEAT, FOOT))
     whole = elastic_casing(read(tmp_path, tables))[1]
