@@ -114,7 +114,7 @@ CATALOGUE = {
     "W-UNUSED": (NOTE, "An entry of the case has no effect."),
     "W-WEDGED": (NOTE, "Meshes are loaded on both flanks at once."),
     "W-WEDGING": (NOTE, "Teeth have so little play that they may wedge."),
-    "W-WIDTHS": (NOTE, "Gears are wider than their mates."),
+    "W-WIDTHS": (NOTE, "Gears are wider than their mates; in a gearbox a doubt where they face each other in part."),
 }
 """Severity and meaning of every code, in one sentence; the text of a finding says the numbers."""
 

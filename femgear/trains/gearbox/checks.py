@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 
 from femgear.case.fault_sections import no_faults
 from femgear.case.load_spectrum import check_running_shares
@@ -29,6 +29,7 @@ from femgear.trains.gearbox.geometry import (
     DISTANCE_TOLERANCE,
     StageSizes,
     carriers,
+    facing_gears,
     pair_sizes,
     rolling_bearing,
     set_sizes,
@@ -489,9 +490,7 @@ def _pair(case: GearboxCase, stage: PairSection, key: str) -> Iterator[CaseError
     distance = math.dist(first.axis, second.axis)
     yield from _distance(distance, sizes, f"{key}.shafts", "the axes of the two shafts")
     yield from carrier_entries(case, stage, key)
-    positions = stage.positions or (0.0, 0.0)
-    places = [shaft.start + position for shaft, position in zip((first, second), positions, strict=True)]
-    yield from _mid_planes(places, sizes, f"{key}.positions")
+    yield from _mid_planes(case, stage, key)
 
 
 def _planetary(case: GearboxCase, stage: BoxPlanetarySection, key: str) -> Iterator[CaseError]:
@@ -545,9 +544,7 @@ def _planetary(case: GearboxCase, stage: BoxPlanetarySection, key: str) -> Itera
                 value=f"{LENGTH.show(math.dist(shaft.axis, shafts[0][1].axis))} apart",
                 limit="one axis of sun, carrier and ring",
             )
-    places = [shaft.start + (getattr(stage, f"{name}_position") or 0.0) for name, shaft in shafts]
-    for place in places[1:]:
-        yield from _mid_planes([places[0], place], sizes, f"{key}.sun_position")
+    yield from _mid_planes(case, stage, key)
 
 
 def _wrong_train(teeth, key: str, wanted: str) -> CaseError:
@@ -573,18 +570,19 @@ def _distance(distance: float, sizes: StageSizes, key: str, what: str) -> Iterat
         )
 
 
-def _mid_planes(places: Iterable[float], sizes: StageSizes, key: str) -> Iterator[CaseError]:
-    first, second = places
-    reach = 0.5 * sum(sizes.face_widths) if all(sizes.face_widths) else DISTANCE_TOLERANCE
-    if abs(first - second) >= max(reach, DISTANCE_TOLERANCE):
-        yield CaseError(
-            "the gears do not face each other along their axes",
-            code="E-RANGE",
-            key=key,
-            value=f"middles at z = {LENGTH.show(first)} and {LENGTH.show(second)}",
-            limit=f"less than {LENGTH.show(reach)} apart",
-            remedy="correct the positions on the shafts, or shaft.start",
-        )
+def _mid_planes(case: GearboxCase, stage: PairSection | BoxPlanetarySection, key: str) -> Iterator[CaseError]:
+    """Refuse gears in mesh that have no face width in common."""
+    for entry, (first, second), widths in facing_gears(case, stage):
+        reach = 0.5 * sum(widths) if all(widths) else DISTANCE_TOLERANCE
+        if abs(first - second) >= max(reach, DISTANCE_TOLERANCE):
+            yield CaseError(
+                "the gears do not face each other along their axes",
+                code="E-RANGE",
+                key=f"{key}.{entry}",
+                value=f"middles at z = {LENGTH.show(first)} and {LENGTH.show(second)}",
+                limit=f"less than {LENGTH.show(reach)} apart",
+                remedy="correct the positions on the shafts, or shaft.start",
+            )
 
 
 def _loads(case: GearboxCase) -> Iterator[CaseError]:

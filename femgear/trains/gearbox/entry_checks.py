@@ -36,6 +36,20 @@ def massless_bodies(case: GearboxCase) -> Iterator[CaseError]:
             )
 
 
+def check_shafts_have_mass(case: GearboxCase) -> None:
+    """Refuse shafts with parts of no density (E-MASS): deflection needs none, motion does."""
+    for number, shaft in enumerate(case.shaft):
+        if shaft.part and case.material_of(shaft).density == 0.0:
+            raise CaseError(
+                f"shaft {shaft.name} has no mass, and so no motion",
+                code="E-MASS",
+                key="material.density" if shaft.material is None else f"shaft[{number}].material.density",
+                value="0 kg/m^3",
+                limit="above 0; deflection alone needs none (--only deflection)",
+                remedy="give the density, steel has 7850 kg/m^3",
+            )
+
+
 def _with_mass_of_sets(case: GearboxCase) -> Iterator[str]:
     """Shafts with the mass of sun, carrier or ring of teeth, of a carrier from a file, or of planets on stiff pins."""
     for stage in case.planetary:

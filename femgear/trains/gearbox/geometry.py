@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any
@@ -13,6 +14,7 @@ from femgear.gears.planetary import equal_planet_angles
 from femgear.gears.profile import base_helix_angle
 from femgear.system.rolling_bearings import BallBearing, Bearing, RollerBearing
 from femgear.trains.gearbox.case_file import (
+    CASING,
     BoxBearingSection,
     BoxPlanetarySection,
     GearboxCase,
@@ -60,6 +62,30 @@ class StageSizes:
     internal: bool = False
     face_widths: tuple[float, ...] = (0.0, 0.0)
     planet_angles: tuple[float, ...] = ()
+
+
+def facing_gears(
+    case: GearboxCase, stage: PairSection | BoxPlanetarySection
+) -> Iterator[tuple[str, tuple[float, float], tuple[float, float]]]:
+    """List the gears in mesh whose places are known: entry of a place, z of both middles and both face widths [m].
+
+    Planets are where the carrier is. Where that is the casing, sun and ring face each other over the planets.
+    """
+    if isinstance(stage, PairSection):
+        positions, widths = stage.positions or (0.0, 0.0), pair_sizes(stage).face_widths
+        starts = [case.shaft_named(name).start for name in stage.shafts]
+        yield "positions", (starts[0] + positions[0], starts[1] + positions[1]), (widths[0], widths[1])
+        return
+    width: dict[str, float] = dict(zip(("sun", "carrier", "ring"), set_sizes(stage).face_widths, strict=True))
+    place = {
+        name: case.shaft_named(shaft).start + (getattr(stage, f"{name}_position") or 0.0)
+        for name in width
+        if (shaft := getattr(stage, name)) != CASING
+    }
+    meshes = ("sun", "carrier"), ("ring", "carrier")
+    for first, second in meshes if "carrier" in place else (("sun", "ring"),):
+        if first in place and second in place:
+            yield f"{first}_position", (place[first], place[second]), (width[first], width[second])
 
 
 def pair_sizes(stage: PairSection) -> StageSizes:

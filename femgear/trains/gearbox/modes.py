@@ -10,7 +10,6 @@ from itertools import pairwise
 import numpy as np
 
 from femgear.case.dependencies import Steps
-from femgear.errors import CaseError
 from femgear.solvers.linear.modal import undamped_modes
 from femgear.solvers.linear.tracking import CampbellData, campbell_data
 from femgear.system.assembly import Assembly, Beam
@@ -22,6 +21,7 @@ from femgear.trains.gearbox.casing import called
 from femgear.trains.gearbox.deflection import Deflection, laws_of
 from femgear.trains.gearbox.elastic_carrier import with_carriers
 from femgear.trains.gearbox.elastic_ring import elastic_rings, with_rings
+from femgear.trains.gearbox.entry_checks import check_shafts_have_mass
 from femgear.trains.gearbox.model import GearboxModel, StageModel, member_of_stations
 from femgear.trains.gearbox.sensors import gearbox_sensors, sensor_rows
 
@@ -123,16 +123,7 @@ def linear_system(found: Deflection) -> tuple[Assembly, MechanicalSystem, np.nda
     Slices that carry nothing have no stiffness. CaseError: a shaft without mass (E-MASS).
     """
     model = found.model
-    for number, shaft in enumerate(model.case.shaft):
-        if shaft.part and shaft.material is not None and shaft.material.density == 0.0:
-            raise CaseError(
-                f"shaft {shaft.name} has no mass, and so no motion",
-                code="E-MASS",
-                key=f"shaft[{number}].material.density",
-                value="0 kg/m^3",
-                limit="above 0; deflection alone needs none (--only deflection)",
-                remedy="give the density, steel has 7850 kg/m^3",
-            )
+    check_shafts_have_mass(model.case)
     bearings = []
     for number, law, springs in laws_of(model, model.estimate):
         tangent = law.share(found.bearing_stiffness[number])

@@ -19,7 +19,7 @@ import numpy as np
 
 from femgear.case.gear_set import planetary_set
 from femgear.case.quantities import LENGTH
-from femgear.findings import Finding
+from femgear.findings import DOUBT, Finding
 from femgear.trains.gearbox.case_file import (
     CASING,
     BoxPlanetarySection,
@@ -28,7 +28,14 @@ from femgear.trains.gearbox.case_file import (
     PairSection,
     teeth_of,
 )
-from femgear.trains.gearbox.geometry import DISTANCE_TOLERANCE, carriers, pair_sizes, planet_radius, set_sizes
+from femgear.trains.gearbox.geometry import (
+    DISTANCE_TOLERANCE,
+    carriers,
+    facing_gears,
+    pair_sizes,
+    planet_radius,
+    set_sizes,
+)
 
 _WIDER = 0.05
 """Share by which a shaft may be wider than the bore of the teeth that sit on it."""
@@ -87,6 +94,21 @@ def overlaps(case: GearboxCase) -> Iterator[Finding]:
                     text = f"shaft {shaft.name} reaches into {gear.name} by {LENGTH.show(reach)}"
                     remedy = "correct its axis or diameters, or the place of the gear"
                     yield Finding("W-OVERLAP", gear.key, text, remedy=remedy)
+
+
+def common_faces(case: GearboxCase) -> Iterator[Finding]:
+    """Tell gears in mesh that face each other on a part of the narrower one (W-WIDTHS)."""
+    for kind in ("pair", "planetary"):
+        for number, stage in enumerate(getattr(case, kind)):
+            for entry, (first, second), widths in facing_gears(case, stage):
+                common = 0.5 * sum(widths) - abs(first - second)
+                if all(widths) and common < min(widths) - DISTANCE_TOLERANCE:
+                    text = (
+                        f"gears of {stage.name} face each other on {LENGTH.show(common)} of {LENGTH.show(min(widths))}:"
+                        " stiffness and stresses of their teeth are those of the whole width"
+                    )
+                    key, remedy = f"{kind}[{number}].{entry}", "correct the positions, or give the common face width"
+                    yield Finding("W-WIDTHS", key, text, remedy=remedy, severity=DOUBT)
 
 
 def _beside_planets(case: GearboxCase) -> Iterator[Finding]:

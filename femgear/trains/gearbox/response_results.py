@@ -141,9 +141,30 @@ def _at_sensors(found: GearboxResponse, moved: dict[str, np.ndarray]) -> dict[st
     return {
         "level": ("speed sensor", level(found, moved), "m/s^2", "root mean square of the acceleration"),
         "level_of_stage": ("speed sensor stage", by_stage, "m/s^2", "the same by the lines of one stage"),
+        "outer_level": (
+            "speed sensor stage",
+            _outer_levels(found, moved),
+            "1",
+            "share of the power of the level at the outermost side bands of a stage, of sensors off its ring",
+        ),
         **_of_paths(found, moved),
         **_complex("lines", "speed sensor line", lines, "m/s^2", "acceleration, amplitude of the line"),
     }
+
+
+def _outer_levels(found: GearboxResponse, moved: dict[str, np.ndarray]) -> np.ndarray:
+    """Share (v, s, stages) of the power of levels at the outermost side bands of mesh forces, and beyond these.
+
+    Zero of sensors on the ring of the stage: planets that pass make side bands there, however few the forces have.
+    """
+    case = found.deflection.model.case
+    sensors, whole = gearbox_sensors(case), level(found, moved)
+    shares = np.zeros((*whole.shape, len(found.stages)))
+    for number, stage in enumerate(found.stages):
+        off = [i for i, sensor in enumerate(sensors) if sensor.ring != stage.name]
+        outer = _rms(moved[stage.name][..., np.abs(stage.side_band) >= case.dynamics.side_bands])
+        shares[:, off, number] = ((outer / np.where(whole > 0.0, whole, 1.0)) ** 2)[:, off]
+    return shares
 
 
 def _by_friction(found: GearboxResponse, without: GearboxResponse, sensors: int, bearings: int) -> dict[str, tuple]:
@@ -384,6 +405,10 @@ def gearbox_response_warnings(data: xr.Dataset) -> Iterator[Finding]:
         outer = data["outer"].values[:, number]
         if outer.max() > _TAIL:
             text = f"{outer.max():.2g} of the mesh forces of {stage} are at the outermost side bands"
+            yield Finding("W-TAIL", "dynamics.side_bands", text, remedy="take more of them")
+        elif "outer_level" in data and (share := data["outer_level"].values[..., number]).max() > _TAIL:
+            name = data["sensor"].values[np.unravel_index(int(share.argmax()), share.shape)[1]]
+            text = f"{share.max():.2g} of the power at {name} are at the outermost side bands of {stage}"
             yield Finding("W-TAIL", "dynamics.side_bands", text, remedy="take more of them")
         yield from _short_excitation(data, number, stage)
     yield from _level_excitation(data)

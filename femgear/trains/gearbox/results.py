@@ -10,11 +10,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from femgear.case.gear_set import planetary_set
 from femgear.case.load_spectrum import running_shares
 from femgear.case.messages import estimated_materials
 from femgear.case.quantities import RPM
 from femgear.errors import GeometryError
 from femgear.findings import DOUBT, FAULT, Finding
+from femgear.gears.checks import check_meshes
 from femgear.gears.planetary import assembly_positions
 from femgear.report.tables import Block, describe_modes, tabulate
 from femgear.stages.life_results import describe_damage, describe_life, life_findings
@@ -37,7 +39,7 @@ from femgear.trains.gearbox.geometry import planet_distance, planet_radius, set_
 from femgear.trains.gearbox.life import bearing_life_findings, describe_load_cases, life_text, life_variables
 from femgear.trains.gearbox.model import StageModel, bearing_motions, bearing_places, member_of_stations
 from femgear.trains.gearbox.modes import GearboxModes
-from femgear.trains.gearbox.overlaps import overlaps
+from femgear.trains.gearbox.overlaps import common_faces, overlaps
 from femgear.trains.gearbox.planet_shafts import standing_planets
 from femgear.trains.gearbox.play import play_findings, slack_bearings
 from femgear.trains.gearbox.sensors import (
@@ -595,11 +597,12 @@ def gearbox_warnings(case: GearboxCase) -> Iterator[Finding]:
     yield from sensor_notices(case)
     yield from idle_entries(case)
     yield from overlaps(case)
+    yield from common_faces(case)
     yield from standing_planets(case)
     yield from transient_notices(case)
     for kind in ("pair", "planetary"):
         for i, stage in enumerate(getattr(case, kind)):
-            given = _without_effect(stage.teeth or {})
+            given = _without_effect(stage.teeth or {}, elastic_ring=kind == "planetary" and stage.elastic_ring)
             if given:
                 text = f"{', '.join(given)} of these teeth have no effect: shafts and bearings of the gearbox hold them"
                 yield Finding("W-UNUSED", f"{kind}[{i}].teeth", text)
@@ -613,7 +616,8 @@ def _of_teeth(case: GearboxCase) -> Iterator[Finding]:
         for i, stage in enumerate(getattr(case, kind)):
             if (teeth := teeth_of(stage)) is None:
                 continue
-            for finding in (*estimated_materials(teeth), *thin_rims(teeth), *left_out_of_faults(teeth)):
+            rims = [finding for finding in check_meshes(planetary_set(teeth)) if finding.code == "W-RIM"]
+            for finding in (*estimated_materials(teeth), *rims, *thin_rims(teeth), *left_out_of_faults(teeth)):
                 alike = finding.code, finding.key, finding.text
                 first.setdefault(alike, replace(finding, key=f"{kind}[{i}].teeth.{finding.key}"))
                 count[alike] += 1
@@ -659,9 +663,10 @@ _WITHOUT_EFFECT = (
 )
 
 
-def _without_effect(tables: dict) -> list[str]:
+def _without_effect(tables: dict, *, elastic_ring: bool) -> list[str]:
     found = [f"{section}.{key}" for section, key in _WITHOUT_EFFECT if key in tables.get(section, {})]
     for gear in ("gear_1", "gear_2", "sun", "ring", "carrier"):
         section = tables.get(gear)
-        found += [f"{gear}.{key}" for key in _HOLDS if isinstance(section, dict) and key in section]
+        holds = [key for key in _HOLDS if not (gear == "ring" and elastic_ring and key.startswith("foundation"))]
+        found += [f"{gear}.{key}" for key in holds if isinstance(section, dict) and key in section]
     return found

@@ -28,6 +28,7 @@ from femgear.trains.gearbox.casing_draft import draft_casing
 from femgear.trains.gearbox.casing_file import check_casing_file, describe_casing
 from femgear.trains.gearbox.deflection import Deflection, check_held, solve_deflection
 from femgear.trains.gearbox.dynamic_model import check_dynamic_model, gearbox_dynamic_model
+from femgear.trains.gearbox.entry_checks import check_shafts_have_mass
 from femgear.trains.gearbox.friction import box_friction_findings, friction_excites
 from femgear.trains.gearbox.judgements import gearbox_judgements
 from femgear.trains.gearbox.key_figures import gearbox_key_figures
@@ -283,6 +284,7 @@ GEARBOX = Train(
             solve=solve_box_modes,
             takes=("deflection",),
             options=("steps",),
+            check=check_shafts_have_mass,
             verdict=modes_verdict,
             describe=lambda results: describe_gearbox_modes(results.modes),
             tables=lambda results: tuple(describe_modes_at_sensors(results.modes)),
@@ -297,6 +299,7 @@ GEARBOX = Train(
             options=("progress", "steps"),
             wanted=lambda case: not why_silent(case),
             unavailable=why_silent,
+            check=check_shafts_have_mass,
             verdict=_response_verdict,
             describe=lambda results: describe_gearbox_response(results.dynamics),
             tables=lambda results: response_tables(results.dynamics),
@@ -311,6 +314,7 @@ GEARBOX = Train(
             options=("progress", "steps"),
             wanted=lambda case: not _no_runup(case),
             unavailable=_no_runup,
+            check=check_shafts_have_mass,
             verdict=_response_verdict,
             describe=lambda results: describe_gearbox_response(results.runup, "Run-up of the stages"),
             tables=lambda results: (

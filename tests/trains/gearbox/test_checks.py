@@ -266,3 +266,15 @@ def test_play_of_springs_needs_springs(entries, key, value):
     _replaced(1, **entries)(tables)
     error = problems(tables)[key]
     assert (error.code, error.value) == ("E-BEARING", value) and error.remedy
+
+
+@pytest.mark.parametrize(("place", "refused"), [("47 mm", False), ("48 mm", True)])
+def test_planets_beside_their_sun_do_not_mesh(place, refused):
+    tables = set_on_shafts()
+    # sun at 0 mm, both 18 mm wide
+    tables["planetary"][0]["carrier_position"] = place
+    if refused:
+        error = problems(tables)["planetary[0].sun_position"]
+        assert (error.code, error.limit) == ("E-RANGE", "less than 18 mm apart")
+    else:
+        read_case(tables)

@@ -4,7 +4,9 @@ import pytest
 from small_gearbox import pair_tables, planetary_tables
 
 from femgear.errors import CaseError
+from femgear.trains.gearbox.entry_checks import check_shafts_have_mass
 from femgear.trains.reading import read_case
+from femgear.trains.registry import check_case
 
 
 def problems(tables) -> dict[str, CaseError]:
@@ -105,3 +107,13 @@ def test_a_run_up_has_several_speeds():
     assert (error.code, error.key, error.value) == ("E-RANGE", "runup.to", "900 rpm, 4 times")
     tables["runup"]["count"] = 1
     assert not problems(tables)
+
+
+def test_shafts_of_no_density_have_no_modes():
+    tables = pair_tables()
+    check_shafts_have_mass(read_case(tables))
+    tables["material"] = {"density": "0 kg/m^3"}
+    with pytest.raises(CaseError) as refused:
+        check_case(read_case(tables), only="modes")
+    assert (refused.value.code, refused.value.key) == ("E-MASS", "material.density")
+    check_case(read_case(tables), only="deflection")

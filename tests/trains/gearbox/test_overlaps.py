@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 from small_gearbox import pair_tables, set_on_shafts
 
-from femgear.trains.gearbox.overlaps import overlaps
+from femgear.trains.gearbox.overlaps import common_faces, overlaps
 from femgear.trains.reading import read_case
 
 CASES = Path(__file__).parents[3] / "cases"
@@ -104,3 +104,17 @@ def test_planets_that_reach_into_one_another_are_told(planets, teeth, told):
         stage["gears"]["face_width"] = "20 mm"
     found = [finding for finding in overlaps(read_case(tables)) if "no mate" in finding.text]
     assert len(found) == told
+
+
+def test_gears_that_face_each_other_in_part_are_told():
+    tables = pair_tables()
+    assert not [*common_faces(read_case(tables))]
+    tables["pair"][0]["positions"] = ["30 mm", "42 mm"]
+    (finding,) = common_faces(read_case(tables))
+    assert (finding.code, finding.key, finding.severity) == ("W-WIDTHS", "pair[0].positions", "doubt")
+    assert "on 8 mm of 20 mm" in finding.text
+    tables = set_on_shafts()
+    assert not [*common_faces(read_case(tables))]
+    tables["planetary"][0]["carrier_position"] = "34 mm"
+    (finding,) = common_faces(read_case(tables))
+    assert (finding.key, "on 14 mm of 18 mm" in finding.text) == ("planetary[0].sun_position", True)

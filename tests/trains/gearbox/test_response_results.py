@@ -100,6 +100,19 @@ def test_side_bands_and_an_excitation_that_end_too_early_are_told(data):
     assert text == "excitation to 6 kHz in place of 3 kHz changes the level of z at 2500 rpm by -0.7 dB"
 
 
+def test_levels_at_the_outermost_side_bands_are_told(data):
+    assert not data["outer_level"].values.any()
+    found = response()
+    stage = found.stages[0]
+    found = replace(found, stages=(replace(stage, side_band=np.where(stage.harmonic == 1, 4, 0)),))
+    data = GearboxResponseResult(found, whole=True).dataset()
+    power = data["lines_real"].values ** 2 + data["lines_imag"].values ** 2
+    share = power[..., data["harmonic"].values == 1].sum(axis=2) / power.sum(axis=2)
+    assert data["outer_level"].values[..., 0] == pytest.approx(share)
+    (finding,) = (one for one in gearbox_response_warnings(data) if one.key == "dynamics.side_bands")
+    assert finding.code == "W-TAIL" and f"{share.max():.2g} of the power" in finding.text
+
+
 def test_stages_that_change_one_another_are_told(data):
     cross = xr.DataArray(np.array([[[0.0]], [[0.2]]]), dims=("speed", "stage", "other_stage"))
     (finding,) = gearbox_response_warnings(data.assign(cross_excitation=cross))

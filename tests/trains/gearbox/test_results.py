@@ -64,6 +64,23 @@ def test_supports_of_the_teeth_have_no_effect():
     assert "gear_1.bearing_stiffness" in finding.text
 
 
+def test_an_elastic_ring_needs_its_foundation():
+    tables = elastic_set_tables("cases/planetary_27_40_108.toml")
+    stage = tables["planetary"][0]
+    stage["teeth"]["ring"]["foundation_radial"] = "1e10 N/m^3"
+    for elastic in (True, False):
+        stage["elastic_ring"] = elastic
+        unused = [one.text for one in gearbox_warnings(read_case(tables)) if one.code == "W-UNUSED"]
+        assert any("ring.foundation_radial" in text for text in unused) != elastic
+
+
+def test_thin_rims_of_teeth_are_told():
+    tables = pair_tables(teeth=True)
+    tables["pair"][0]["teeth"]["gear_1"]["bore_radius"] = "30 mm"
+    (finding,) = gearbox_warnings(read_case(tables))
+    assert (finding.code, finding.key) == ("W-RIM", "pair[0].teeth.gear_1.bore_radius")
+
+
 def test_modes_and_their_parts_are_in_the_file():
     case = read_case(pair_tables())
     data = solve_box_modes(case, solve_deflections(case)).contents()
