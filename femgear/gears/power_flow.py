@@ -136,6 +136,7 @@ def power_flow(
     outputs: Sequence[str] = (),
     joined: Sequence[Sequence[str]] = (),
     share: bool = False,
+    planets: Collection[str] = (),
 ) -> PowerFlow:
     """Compute the speeds and torques of all shafts.
 
@@ -158,6 +159,8 @@ def power_flow(
     share : bool
         Stages side by side, whose shares of a torque follow from their stiffness, get equal ones; without it they are
         refused.
+    planets : collection of str
+        Shafts that refusals ask last for a speed.
 
     Raises
     ------
@@ -177,10 +180,10 @@ def power_flow(
     balance = graph.torques(given, unknown)
     problems = [
         *locks,
-        *_free(graph, turning),
+        *_free(graph, turning, [*speeds], planets),
         *_contradictions(graph, turning, speeds, locked),
         *_undetermined(graph, balance, held, outputs, locked, share=share),
-        *_unbalanced(graph, balance, torques, len(unknown), locked),
+        *_unbalanced(graph, balance, torques, unknown, [shaft for shaft in speeds if shaft not in torques], locked),
     ]
     if problems:
         raise several(problems)
@@ -384,12 +387,13 @@ def _stopped(graph: ShaftGraph, standing: Collection[int]) -> dict[int, tuple[fr
     return stopped
 
 
-def _free(graph: ShaftGraph, turning: ExactSolution) -> list[CaseError]:
+def _free(graph: ShaftGraph, turning: ExactSolution, given: Sequence[str], planets: Collection[str]) -> list[CaseError]:
     """Shafts whose speed nothing decides."""
     problems = []
     for cluster in connected_sets([{group, *others} for group, others in turning.open.items()]):
         shafts = graph.names(cluster)
-        free = [graph.names([group])[0] for group in turning.parameters if group in cluster]
+        missing = sum(group in cluster for group in turning.parameters)
+        free = _settling(graph, given, sorted(shafts, key=lambda shaft: shaft in planets), missing)
         more = "a speed is" if len(free) == 1 else f"{len(free)} speeds are"
         problems.append(
             CaseError(
@@ -400,6 +404,16 @@ def _free(graph: ShaftGraph, turning: ExactSolution) -> list[CaseError]:
             )
         )
     return problems
+
+
+def _settling(graph: ShaftGraph, given: Sequence[str], shafts: Sequence[str], missing: int) -> list[str]:
+    """Choose the first of shafts whose speeds, so many as are missing, decide all others."""
+    chosen, open_ways = list[str](), len(graph.speeds(given).parameters)
+    for shaft in shafts:
+        left = len(graph.speeds([*given, *chosen, shaft]).parameters)
+        if left < open_ways and len(chosen) < missing:
+            chosen, open_ways = [*chosen, shaft], left
+    return chosen
 
 
 def _contradictions(
@@ -475,10 +489,17 @@ def _undetermined(
 
 
 def _unbalanced(
-    graph: ShaftGraph, balance: ExactSolution, torques: Mapping[str, float], unknown: int, locked: Collection[int]
+    graph: ShaftGraph,
+    balance: ExactSolution,
+    torques: Mapping[str, float],
+    unknown: Sequence[str],
+    driven: Sequence[str],
+    locked: Collection[int],
 ) -> list[CaseError]:
-    """Given torques that drive a motion which no output brakes."""
-    problems, first_given, given = [], len(graph.conditions) + unknown, [*torques]
+    """Given torques that drive a motion which no output brakes; ``driven`` shafts have a given speed, but no torque."""
+    problems, first_given, given = [], len(graph.conditions) + len(unknown), [*torques]
+    settled = {graph.group[shaft] for shaft in (*torques, *unknown)}
+    open_shafts = [shaft for shaft in driven if graph.group[shaft] not in settled]
     for relation in balance.relations:
         shares = {given[column - first_given]: share for column, share in relation.items()}
         groups = {graph.group[shaft] for shaft in shares}
@@ -490,15 +511,18 @@ def _unbalanced(
         names = sorted(shares, key=given.index)
         text = f"nothing takes the torque on shaft {last!r}"
         text = text if alone else f"the torques on {_shafts(names)} do not balance"
+        remedy = "name the shaft that takes the power as an output" if alone else f"make {last!r} an output"
+        remedy += "" if alone else ", whose torque is found"
+        if alone and open_shafts:
+            text += f"; {_shafts(open_shafts)} of given speed {'have' if len(open_shafts) > 1 else 'has'} no torque"
+            remedy = f"give the torque of {_listed(open_shafts)}, or name its load an output, whose torque is found"
         problems.append(
             CaseError(
                 text,
                 code="E-LOAD-BALANCE",
                 value=float(torques[last]),
                 limit=f"{fits:.9g} N m",
-                remedy="name the shaft that takes the power as an output"
-                if alone
-                else f"make {last!r} an output, whose torque is found",
+                remedy=remedy,
             )
         )
     return problems

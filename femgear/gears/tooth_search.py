@@ -34,6 +34,8 @@ KINDS = {
 """Kinds of gears that are searched, with the names of their gears."""
 LEAST_TEETH, MOST_SUN_TEETH, MOST_PLANET_TEETH, MOST_TEETH = 14, 60, 120, 300
 """Fewest teeth of a gear, most of a sun or pinion (of a second planet gear too), of planets, of any gear."""
+LARGEST_TOLERANCE = 0.2
+"""Of the ratio that is asked for, relative to it."""
 LEAST_UNSHIFTED = 17
 """Fewest teeth without shift: fewer are undercut at 20 degrees."""
 _MESHES = {
@@ -209,9 +211,42 @@ def search_teeth(
             key="--ratio",
             value=demand.ratio,
             limit=f"within {demand.tolerance:.3g} of it, gears of {LEAST_TEETH} to {MOST_TEETH} teeth that close",
-            remedy="a larger --tolerance, another number of planets, or another kind",
+            remedy=_remedy(demand),
         )
     return sorted(sized, key=lambda choice: choice.volume), len(listed) - len(wanted)
+
+
+def _remedy(demand: ToothDemand) -> str:
+    """Say what ratios the kind has, and where there may be teeth of the wanted one."""
+    reach = _reach(demand)
+    words = f"{demand.kind} teeth of this search have ratios of {reach[0]:.3g} to {reach[1]:.3g}; " if reach else ""
+    first = "a larger --tolerance" if demand.tolerance < LARGEST_TOLERANCE else "another --ratio"
+    return f"{words}{first}, another number of planets, or another kind"
+
+
+def _reach(demand: ToothDemand) -> tuple[float, float] | None:
+    """Least and largest ratio that limits of teeth and room leave to pairs and to simple and stepped sets."""
+    sine = math.sin(math.pi / min(demand.planets))
+    if demand.kind == "pair":
+        return 1.0, MOST_TEETH / LEAST_TEETH
+    if demand.kind == "planetary":
+        suns, planets = range(LEAST_TEETH, MOST_SUN_TEETH + 1), range(LEAST_TEETH, MOST_PLANET_TEETH + 1)
+        sets = [(s, p, p, s + 2 * p) for s, p in product(suns, planets) if (s + p) * sine >= p + 3]
+    elif demand.kind == "stepped":
+        few = range(LEAST_UNSHIFTED, MOST_SUN_TEETH // 2 + 1)
+        low, high = MODULE_RATIOS
+        sets = []
+        for sun, second in product(few, few):
+            for first in range(second + 1, MOST_PLANET_TEETH + 1):
+                total = sun + first
+                least = max(second + LEAST_UNSHIFTED + 1, second + math.ceil(total / high))
+                if total * sine >= first + 3:
+                    sets += [(sun, first, second, ring) for ring in (least, second + int(total / low))]
+    else:
+        return None
+    inner = [ring * first / (sun * second) for sun, first, second, ring in sets if ring <= MOST_TEETH]
+    ratios = [{"ring": 1.0 + one, "carrier": one, "sun": 1.0 + 1.0 / one}[demand.stands] for one in inner]
+    return min(ratios), max(ratios)
 
 
 def candidates(demand: ToothDemand) -> list[tuple[tuple[int, ...], int]]:
@@ -465,7 +500,7 @@ def _check(demand: ToothDemand) -> None:
         raise GeometryError(message, code="E-CHOICE", key="--fixed", value=demand.stands, limit=limit)
     numbers = {
         "--ratio": (demand.ratio, 1.0, 100.0),
-        "--tolerance": (demand.tolerance, 0.0, 0.2),
+        "--tolerance": (demand.tolerance, 0.0, LARGEST_TOLERANCE),
         "--torque": (demand.torque, 1e-3, 1e9),
         "--width-ratio": (demand.width_ratio, 0.05, 5.0),
         "--contact-limit": (demand.contact_limit, 1e6, 1e10),

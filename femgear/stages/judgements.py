@@ -14,7 +14,7 @@ from typing import Any, Literal
 import numpy as np
 
 from femgear.case.sections import StrengthSection
-from femgear.findings import CATALOGUE, DOUBT, NOTE, Finding
+from femgear.findings import CATALOGUE, DOUBT, FAULT, NOTE, Finding
 from femgear.report.tables import Block, merged_names
 from femgear.stages.life_results import SYMBOLS, first_to_fail, hours_text
 from femgear.stages.strength import OF_ROOTS, RatedFlank, Rating, gear_words
@@ -478,10 +478,17 @@ def judge_noise(
 
 
 def judge_numbers(findings: Sequence[Finding], complete: bool) -> Judgement:
-    """Judge the numbers by the doubts of the run, and whether it ended; faults are of the gears, not of numbers."""
+    """Judge the numbers by the doubts of the run, and whether it ended.
+
+    Faults are of the gears, not of numbers, but those whose code is else a doubt: numbers far beyond their model.
+    """
     doubts = [finding for finding in findings if finding.severity == DOUBT]
+    beyond = [f for f in findings if f.severity == FAULT and CATALOGUE.get(f.code, ("",))[0] == DOUBT]
     if not complete:
         return Judgement(SURE, "bad", "the run did not come to its end", "", "The run did not come to its end")
+    if beyond:
+        words = ", ".join(_meaning(code) for code in dict.fromkeys(finding.code for finding in beyond))
+        return Judgement(SURE, "bad", "numbers are far beyond their model", words, f"Numbers hold nothing: {words}")
     if doubts:
         codes = list(dict.fromkeys(finding.code for finding in doubts if finding.code))
         shown = ", ".join([*map(_meaning, codes[:1]), *codes[1:4]])

@@ -225,10 +225,16 @@ def new_case(
 
 def _planets_text(kind: str, teeth: tuple[int, ...], module: str, given: Mapping[str, Any]) -> str:
     """Write a gearbox with planets around a carrier."""
-    size, planets, notes = _read(Module, module, "--module"), given["planets"] or 3, dict[str, str]()
+    size, notes = _read(Module, module, "--module"), dict[str, str]()
     width = 12.0 * size if given["face-width"] is None else _read(FaceWidth, given["face-width"], "--face-width")
-    shown = {"module": size, "width": width, "planets": planets, "torque": given["torque"], "speed": given["speed"]}
-    tables = planets_case(kind, teeth, **shown, notes=notes)
+    shown = {
+        "module": size,
+        "width": width,
+        "planets": given["planets"],
+        "torque": given["torque"],
+        "speed": given["speed"],
+    }
+    tables, planets, faults = planets_case(kind, teeth, **shown, notes=notes)
     taken = {"teeth": " ".join(map(str, teeth)), "module": f'"{module}"', "planets": planets}
     load = tables["operation"]["load_case"][0]["torque"]["motor"]
     taken |= {"face-width": f'"{LENGTH.show(width)}"', "torque": f'"{load}"', "speed": f'"{given["speed"]}"'}
@@ -236,7 +242,7 @@ def _planets_text(kind: str, teeth: tuple[int, ...], module: str, given: Mapping
         notes["operation.load_case[0].torque"] = "estimated: K factor of 1 N/mm^2"
     head = [_HEAD.format(kind) + _STANDS, "Assumed: " + " ".join(f"--{key} {value}" for key, value in taken.items())]
     head.append("Every planet is a shaft on the carrier, every mesh a pair; gears have no profile shift.")
-    return draft_text(tables, notes, word="estimated", head=head)
+    return draft_text(tables, notes, word="estimated", head=[*head, *faults])
 
 
 def _of_kind(kind: str, beta: float, slices: int, notes: dict[str, str]) -> dict[str, Any]:
@@ -311,6 +317,9 @@ def _teeth(kind: str, teeth: tuple[int, ...]) -> tuple[int, ...]:
     usual, teeth = KINDS[kind], teeth or KINDS[kind]
     if len(usual) == 3 == len(teeth):
         teeth = (*teeth[:2], abs(teeth[2]))
+    if kind in PLANET_KINDS and len(usual) == len(teeth):
+        rings = (2, 4) if kind == "wolfrom" else (len(teeth) - 1,)
+        teeth = tuple(abs(z) if number in rings else z for number, z in enumerate(teeth))
     if len(usual) == 2 == len(teeth) and min(teeth) < 0:
         external = [abs(z) for z in teeth]
         raise CaseError(

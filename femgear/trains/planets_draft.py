@@ -9,11 +9,12 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from itertools import product
 from typing import Any
 
 from femgear.case.estimates import Estimate, cylinder, estimated_mesh_stiffness, usual_rim, usual_torque
 from femgear.case.quantities import FREE, INERTIA, LENGTH, MASS, STIFFNESS, TORSION, to_si
-from femgear.errors import CaseError
+from femgear.errors import CaseError, GeometryError
 from femgear.gears.paired_planets import angle_between
 from femgear.gears.planet_assembly import assembly_step, double_gears, ravigneaux_gears, stepped_gears
 from femgear.gears.power_flow import pair_condition, power_flow
@@ -38,6 +39,10 @@ _BEARING, _FLANGE = 0.2, 2.0
 """Stiffness of a bearing, and of the flange of a ring, over that of a mesh."""
 _LEVER = 3.0
 """Lever of the tilt stiffness of a flange over the face width."""
+_MOST_PAIRS = 20
+"""Pairs of a gearbox."""
+_ROOM = 1.0 - 1e-9
+"""Least gap between tips that do not mesh [modules]."""
 _SHAFT = 0.6
 """Outer diameter of shafts over the root circle of their smallest gear."""
 
@@ -96,11 +101,11 @@ def planets_case(
     *,
     module: float,
     width: float,
-    planets: int,
+    planets: int | None,
     torque: str | None,
     speed: str,
     notes: dict[str, str],
-) -> dict[str, Any]:
+) -> tuple[dict[str, Any], int, list[str]]:
     """Make the tables of a gearbox with planets, remarks on what is estimated in ``notes``.
 
     Parameters
@@ -111,18 +116,27 @@ def planets_case(
         As there.
     module, width : float
         Of the first plane, and of all gears [m].
-    planets : int
-        Branches, equally spaced.
+    planets : int, optional
+        Branches, equally spaced; by default the first of 3, 4, 5 and 2 that fit with a module of room.
     torque, speed : str
         On the driven member; without a torque that of a usual load.
+
+    Returns
+    -------
+    tables : dict
+    planets : int
+    faults : list of str
+        What gears lack of a module of room beside one another.
 
     Raises
     ------
     CaseError, GeometryError
-        Planets that do not fit (E-ASSEMBLY), tooth numbers that make no set (E-CENTRE-DISTANCE, E-TEETH).
+        Numbers of planets that no gearbox takes (E-RANGE), planets that do not fit (E-ASSEMBLY), tooth
+        numbers that make no set (E-CENTRE-DISTANCE, E-TEETH).
     """
     layout = _LAYOUTS[kind](*teeth)
-    _check_fit(layout, planets)
+    planets = _usual_planets(layout) if planets is None else planets
+    _check_fit(kind, teeth, layout, planets)
     stiffness = float(f"{_BEARING * estimated_mesh_stiffness(_MODULUS, _MODULUS, width):.3g}")
     build = _Tables(layout, module, width, stiffness, notes)
     for name in layout.central:
@@ -133,7 +147,7 @@ def planets_case(
     load = torque or f"{_usual_load(layout, module, width, planets):.3g} N m"
     loads = [{"name": "motor", "shaft": layout.driven, **build.end(layout.driven)}]
     loads += [{"name": "load", "shaft": layout.output, **build.end(layout.output)}]
-    return {
+    tables = {
         "format": 1,
         "model": "gearbox",
         "title": f"{kind.capitalize()} {'/'.join(map(str, teeth))}",
@@ -148,6 +162,7 @@ def planets_case(
             "load_case": [{"name": "nominal", "torque": {"motor": load}, "speed": {layout.driven: speed}}],
         },
     }
+    return tables, planets, _lacks_of_room(layout, planets, module)
 
 
 class _Tables:
@@ -312,19 +327,109 @@ class _Tables:
         self.bearings.append(table | {"estimated": True})
 
 
-def _check_fit(layout: _Layout, planets: int) -> None:
-    """Refuse numbers of planets that do not assemble with equal spacing."""
+def _assemble(layout: _Layout, planets: int) -> bool:
+    """Whether so many equally spaced branches assemble."""
+    return (1 / assembly_step(layout.gears) / planets).denominator == 1
+
+
+def _fitting(layout: _Layout) -> list[int]:
+    """Numbers of branches that assemble, have a module of room and are no more than a gearbox takes."""
+    numbers = range(1, _MOST_PAIRS // len(layout.meshes) + 1)
+    return [n for n in numbers if _assemble(layout, n) and _room(layout, n)[0] >= _ROOM]
+
+
+def _usual_planets(layout: _Layout) -> int:
+    """Number of branches where none is given: the first usual one that fits, else that assembles."""
+    usual, fitting = (3, 4, 5, 2), _fitting(layout)
+    return next((n for n in usual if n in fitting), next((n for n in usual if _assemble(layout, n)), usual[0]))
+
+
+def _check_fit(kind: str, teeth: Sequence[int], layout: _Layout, planets: int) -> None:
+    """Refuse numbers of planets that a gearbox does not take, or that do not assemble with equal spacing."""
+    most, fitting = _MOST_PAIRS // len(layout.meshes), _fitting(layout)
+    listed = ", ".join(map(str, fitting))
+    if not 1 <= planets <= most:
+        text = f"a {kind} case has 1 to {most} planets around its carrier: a gearbox has {_MOST_PAIRS} pairs at most"
+        limit = listed or f"1 to {most}"
+        raise CaseError(text, code="E-RANGE", key="--planets", value=planets, limit=limit)
+    if _assemble(layout, planets):
+        return
+    near = [" ".join(map(str, teeth)) for teeth in _near_teeth(kind, teeth, planets)]
+    remedies = [f"with these teeth --planets {' or '.join(map(str, fitting))}"] if fitting else []
+    remedies += [f"with {planets} planets --teeth {' or '.join(near)}"] if near else []
     places = 1 / assembly_step(layout.gears)
-    if planets < 1 or (places / planets).denominator != 1:
-        fit = [n for n in range(1, 13) if (places / n).denominator == 1]
-        raise CaseError(
-            f"{planets} planets cannot be equally spaced: there are {places} places around the axis",
-            code="E-ASSEMBLY",
-            key="--planets",
-            value=planets,
-            limit=", ".join(map(str, fit)),
-            remedy="other teeth: femgear.gears.planet_assembly has their places, femgear teeth --kind finds sets",
-        )
+    raise CaseError(
+        f"{planets} planets cannot be equally spaced: there are {places} places around the axis",
+        code="E-ASSEMBLY",
+        key="--planets",
+        value=planets,
+        limit=listed or "none with these teeth",
+        remedy="; ".join(remedies) or f"other teeth: femgear teeth --kind {kind} finds sets",
+    )
+
+
+def _near_teeth(kind: str, teeth: Sequence[int], planets: int) -> list[tuple[int, ...]]:
+    """Up to two sets of teeth that differ least from others, by two each at most, and fit with so many planets."""
+    near = list[tuple[int, ...]]()
+    steps = sorted(product(range(-2, 3), repeat=len(teeth)), key=lambda step: (sum(map(abs, step)), step))
+    for step in steps:
+        changed = tuple(z + more for z, more in zip(teeth, step, strict=True))
+        try:
+            layout = _LAYOUTS[kind](*changed)
+            fits = _assemble(layout, planets) and _room(layout, planets)[0] >= _ROOM
+        except (CaseError, GeometryError):
+            continue
+        if fits and min(changed) >= min(17, *teeth):
+            near.append(changed)
+        if len(near) == 2:
+            break
+    return near
+
+
+def _room(layout: _Layout, planets: int) -> tuple[float, str, str]:
+    """Smallest gap between tips that do not mesh [modules], and both gears; the first branch speaks for all."""
+    mates = {frozenset((first.body, second.body)) for first, second, _ in layout.meshes}
+    scales = {gear: scale for *mesh, scale in layout.meshes for gear in mesh}
+    smallest = math.inf, "", ""
+    for (gear, scale), (other, other_scale) in product(scales.items(), repeat=2):
+        if gear.plane != other.plane or gear.body in layout.central:
+            continue
+        radius, angle = layout.planets[gear.body]
+        tip, other_tip = scale * (0.5 * gear.teeth + 1.0), other_scale * (0.5 * other.teeth + 1.0)
+        mesh = frozenset((gear.body, other.body)) in mates
+        if other.body not in layout.central:
+            far, beside = layout.planets[other.body]
+            turns = range(1 if mesh or gear == other else 0, planets)
+            gaps = [
+                math.dist(_place(radius, angle), _place(far, beside + math.tau * n / planets)) - tip - other_tip
+                for n in turns
+            ]
+        elif mesh:
+            continue
+        elif "ring" in other.body:
+            gaps = [other_tip - 2.0 * other_scale - radius - tip]
+        else:
+            gaps = [radius - tip - other_tip]
+        smallest = min(smallest, (min(gaps, default=math.inf), gear.body, other.body))
+    return smallest
+
+
+def _place(radius: float, angle: float) -> tuple[float, float]:
+    return radius * math.cos(angle), radius * math.sin(angle)
+
+
+def _lacks_of_room(layout: _Layout, planets: int, module: float) -> list[str]:
+    """Tell gears that penetrate each other, or have less than a module of room."""
+    gap, *names = _room(layout, planets)
+    if gap >= _ROOM:
+        return []
+    first, second = (name if name in layout.central else f"{name}s" for name in names)
+    size = LENGTH.show(round(abs(gap) * module, 7))
+    both = f"{first} and {second}" if first != second else f"neighbouring {first}"
+    text = f"overlap by {size}" if gap < 0.0 else f"have {size} of room, less than a module"
+    fitting = " or ".join(map(str, _fitting(layout)))
+    remedy = f"--planets {fitting}, or other teeth" if fitting else "other teeth"
+    return [f"The tips of {both} {text}: {remedy}."]
 
 
 def _usual_load(layout: _Layout, module: float, width: float, planets: int) -> float:
@@ -377,6 +482,15 @@ def _stepped(sun: int, first: int, second: int, ring: int) -> _Layout:
 
 
 def _wolfrom(sun: int, first: int, first_ring: int, second: int, second_ring: int) -> _Layout:
+    if first_ring * second == second_ring * first:
+        raise CaseError(
+            "both rings turn alike: the second one stands with the first, its ratio is infinite",
+            code="E-TEETH",
+            key="--teeth",
+            value=f"{first_ring}/{first} and {second_ring}/{second}",
+            limit="different ratios of both rings to their planet gears",
+            remedy="other teeth",
+        )
     a = 0.5 * (sun + first)
     meshes = (
         (_Gear("sun", sun, 0), _Gear("planet", first, 0), 1.0),

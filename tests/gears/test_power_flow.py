@@ -276,3 +276,31 @@ def test_stages_side_by_side_share_equally_where_they_may():
     with pytest.raises(CaseError) as refused:
         power_flow(["a", "b"], pairs, **given)
     assert refused.value.code == "E-TORQUE"
+
+
+def test_a_second_input_without_a_torque_is_named():
+    with pytest.raises(CaseError) as refused:
+        power_flow(
+            ["sun", "carrier", "ring"],
+            [planetary_condition("set", "sun", "carrier", "ring", 24, 72)],
+            speeds={"sun": 100.0, "ring": 10.0},
+            torques={"sun": 58.4},
+            outputs=["carrier"],
+        )
+    assert refused.value.code == "E-LOAD-BALANCE"
+    assert "'ring'" in str(refused.value) and refused.value.remedy.startswith("give the torque of 'ring'")
+
+
+def test_members_are_asked_for_a_missing_speed_before_planets():
+    with pytest.raises(CaseError) as refused:
+        power_flow(
+            ["sun", "ring", "carrier", "planet"],
+            [
+                pair_condition("outside", "sun", "planet", 24, 24, carrier="carrier"),
+                pair_condition("inside", "planet", "ring", 24, 72, internal=True, carrier="carrier"),
+            ],
+            speeds={},
+            torques={},
+            planets=["planet"],
+        )
+    assert refused.value.remedy.startswith("give the speed of 'sun' and 'ring'")

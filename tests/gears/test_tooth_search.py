@@ -190,3 +190,14 @@ def test_ten_thousand_candidates_take_less_than_three_minutes(kind, ratio):
     listed, (sized, beyond) = candidates(demand), search_teeth(demand)
     assert len(listed) - beyond == 10_000 and len(sized) > 5000
     assert time.perf_counter() - start < 180.0
+
+
+@pytest.mark.parametrize("kind", ["planetary", "pair"])
+def test_ratios_that_a_kind_does_not_have_are_told(kind):
+    """No tolerance helps there: what is told has all teeth that the search finds."""
+    with pytest.raises(GeometryError) as refused:
+        search_teeth(ToothDemand(90.0, kind=kind, tolerance=0.2))
+    assert "another --ratio" in refused.value.remedy and "larger --tolerance" not in refused.value.remedy
+    least, most = (float(word) for word in refused.value.remedy.split("ratios of ")[1].split(";")[0].split(" to "))
+    assert least < 3.0 < 9.0 < most
+    assert not any(abs(ratio / 90.0 - 1.0) <= 0.2 for ratio in (least, most))

@@ -236,3 +236,9 @@ def test_numbers_are_judged_by_the_findings():
     # gears that fail say nothing against their numbers
     assert judge_numbers([fault], complete=True).state == "good"
     assert judge_numbers([], complete=False).state == "bad"
+
+
+def test_deflections_far_beyond_small_ones_make_the_numbers_bad():
+    far = Finding("W-DEFLECTION", "", "tilts by 4430 mrad", severity=FAULT)
+    judged = judge_numbers([far], complete=True)
+    assert judged.state == "bad" and "W-DEFLECTION" in judged.limit

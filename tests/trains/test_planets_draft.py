@@ -115,3 +115,54 @@ def test_gears_of_a_draft_have_a_usual_treatment_that_is_told_once(kind):
     assert {stage.teeth["material"]["treatment"] for stage in case.pair} == {"case hardened steel"}
     (finding,) = [finding for finding in gearbox_warnings(case) if finding.code == "W-MATERIAL"]
     assert f"({len(case.pair)} stages)" in finding.text
+
+
+@pytest.mark.parametrize(
+    ("kind", "options"),
+    [("stepped", {"planets": 4}), ("double", {"planets": 6}), ("double", {"teeth": (24, 18, 20, 60)})],
+)
+def test_gears_without_room_are_told_at_the_head_of_the_draft(kind, options):
+    text = new_case(kind, **options)
+    head = " ".join(line.lstrip("# ") for line in text.split("format")[0].splitlines())
+    assert "overlap by" in head
+    size = head.split("overlap by ")[1].split(":")[0]
+    # the same depth as femgear check finds between shafts and gears
+    case = parse_case(text)
+    assert any(f.code == "W-OVERLAP" and f.text.endswith(f"by {size}") for f in gearbox_warnings(case))
+
+
+@pytest.mark.parametrize("kind", PLANET_KINDS)
+def test_numbers_of_planets_that_are_offered_make_cases_without_overlaps(kind):
+    with pytest.raises(CaseError, match="planets around its carrier") as refused:
+        new_case(kind, planets=0)
+    assert refused.value.code == "E-RANGE"
+    numbers = [int(word) for word in refused.value.limit.split(", ")]
+    found = gearbox_warnings(parse_case(new_case(kind, planets=max(numbers))))
+    assert 3 in numbers and "W-OVERLAP" not in [finding.code for finding in found]
+
+
+def test_most_planets_are_those_whose_pairs_a_gearbox_takes():
+    with pytest.raises(CaseError, match="20 pairs at most"):
+        new_case("stepped", teeth=(100, 20, 20, 140), planets=12)
+    assert len(parse_case(new_case("stepped", teeth=(100, 20, 20, 140), planets=10)).pair) == 20
+
+
+def test_planets_that_do_not_assemble_are_refused_with_the_nearest_teeth():
+    with pytest.raises(CaseError) as refused:
+        new_case("stepped", teeth=(24, 40, 16, 80), planets=3)
+    assert (refused.value.code, refused.value.limit) == ("E-ASSEMBLY", "1, 2, 4")
+    offered = refused.value.remedy.split("--teeth ")[1].split(" or ")
+    for teeth in offered:
+        new_case("stepped", teeth=tuple(map(int, teeth.split())), planets=3)
+    # three is not among them: four is the next usual number
+    assert "planet 4" in new_case("stepped", teeth=(24, 40, 16, 80))
+
+
+def test_the_teeth_of_a_ring_may_be_negative():
+    assert new_case("stepped", teeth=(24, 57, 27, -108)) == new_case("stepped", teeth=(24, 57, 27, 108))
+    assert new_case("wolfrom", teeth=(18, 27, -72, 26, -71)) == new_case("wolfrom", teeth=(18, 27, 72, 26, 71))
+
+
+def test_rings_that_turn_alike_make_no_wolfrom_set():
+    with pytest.raises(CaseError, match="ratio is infinite"):
+        new_case("wolfrom", teeth=(18, 27, 72, 27, 72))

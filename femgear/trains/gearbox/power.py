@@ -142,7 +142,9 @@ def gearbox_flow(case: GearboxCase, load_case: LoadCaseSection | None = None) ->
     shaft_of, conditions, given = port_shafts(case), stage_conditions(case), flow_entries(case, load_case)
     try:
         names = [shaft.name for shaft in case.shaft]
-        graph = power_flow(names, conditions, speeds=load_case.speed, share=True, **given)
+        graph = power_flow(
+            names, conditions, speeds=load_case.speed, share=True, planets=carriers(case).keys(), **given
+        )
     except FemgearError as error:
         _locate(error, case, load_case)
         raise
