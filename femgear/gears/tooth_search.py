@@ -245,7 +245,7 @@ def _reach(demand: ToothDemand) -> tuple[float, float] | None:
     else:
         return None
     inner = [ring * first / (sun * second) for sun, first, second, ring in sets if ring <= MOST_TEETH]
-    ratios = [{"ring": 1.0 + one, "carrier": one, "sun": 1.0 + 1.0 / one}[demand.stands] for one in inner]
+    ratios = [{"ring": 1.0 + share, "carrier": share, "sun": 1.0 + 1.0 / share}[demand.stands] for share in inner]
     return min(ratios), max(ratios)
 
 
