@@ -34,7 +34,7 @@ CATALOGUE = {
     "W-COUPLING": (NOTE, "The torque turns a coupling further than couplings go."),
     "W-CROSS": (DOUBT, "Stages change one another by more than a response stage by stage may leave out."),
     "W-DAMPING": (DOUBT, "Without damping resonances have no limit."),
-    "W-DEFLECTION": (DOUBT, "Deflections are no longer small; a fault where they are ten times beyond."),
+    "W-DEFLECTION": (DOUBT, "Deflections are no longer small; in a gearbox a fault where ten times over the limit."),
     "W-EDGE": (DOUBT, "Contacts lie at the end of a flank, where the pressure has no limit."),
     "W-ENDS": (DOUBT, "Free ends of the teeth make meshes softer than the model has them."),
     "W-ESTIMATED": (NOTE, "Values that were left out are estimated."),
