@@ -119,7 +119,7 @@ def rank_causes(case: Any, verdict: MeasuredVerdict, *, progress: Progress | Non
         if getattr(getattr(case, section), name):
             remedy = "take the errors out: they are what is asked for"
             raise CaseError("the case has errors already", code="E-CHOICE", key=entry, remedy=remedy)
-    abnormal = {line.order: line.amplitude for line in verdict.lines if _from_this_set(line, verdict)}
+    abnormal = {line.order: line.amplitude for line in verdict.lines if line.place.verdict not in (NORMAL, FOREIGN)}
     if not abnormal:
         return ()
     speed = verdict.signal.speed * 60.0 / verdict.gear_set.carrier_per_turn[verdict.gear_set.input]
@@ -136,27 +136,6 @@ def rank_causes(case: Any, verdict: MeasuredVerdict, *, progress: Progress | Non
     ranked += _ranked_faults(case, verdict, abnormal, scales, progress)
     smallest_first = sorted(ranked, key=lambda entry: math.inf if math.isnan(entry.size) else entry.size)
     return tuple(sorted(smallest_first, key=lambda entry: -round(entry.explained, 2)))
-
-
-def _from_this_set(line: Any, verdict: MeasuredVerdict) -> bool:
-    """Whether a line is abnormal and may be of this set.
-
-    Beside those that the verdict says are, those at any turns of a part that other lines have: a tooth that hits once a
-    turn makes lines at many turns of its gear, of which the verdict alone counts two.
-    """
-    if line.place.verdict != FOREIGN:
-        return line.place.verdict != NORMAL
-    gears, turning = verdict.gear_set, {other.place.part for other in verdict.lines if other.place.part}
-    parts = ("sun", gears.sun, spacing_symmetry(gears.angles)), ("planet", gears.planet, 1)
-    for name, teeth, step in parts:
-        if name not in turning or teeth is None:
-            continue
-        # against the carrier the sun turns by 1 + z_ring/z_sun in one of its turns, a planet by z_ring/z_planet
-        rate = gears.ring / teeth + (name == "sun")
-        beside = (line.order - np.arange(teeth) * rate) / step
-        if (np.abs(beside - np.rint(beside)) * step <= verdict.tolerance).any():
-            return True
-    return False
 
 
 def _ranked_faults(

@@ -7,6 +7,7 @@ import csv
 import math
 import re
 import sys
+from collections.abc import Collection
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
@@ -22,11 +23,12 @@ from femgear.housing.orders import (
     NORMAL,
     UNEQUAL,
     array_factor,
-    classify_line,
+    classify_lines,
     find_lines,
     spacing_symmetry,
 )
 from femgear.measured.heard_set import HeardSet, heard_set
+from femgear.measured.lines import chance
 from femgear.measured.universal_functions import FREQUENCY, ORDER, read_universal_functions
 from femgear.measured.verdict import draw_side_bands
 from femgear.report.style import save_figure
@@ -109,16 +111,16 @@ def main(
             value=(harmonics, half_width, threshold),
             limit="1 to 12 harmonics, 1 to 60 orders on either side, a threshold of -200 dB up to below 0",
         )
-    rows, order, level, found = [], np.zeros(0), np.zeros(0), []
+    rows, order, level, found = [], np.zeros(0), np.zeros(0), ()
     if spectrum is not None:
         measured = _read(spectrum, channel)
         order = _orders(measured, speed, ratio, spectrum)
         amplitude, step = measured.amplitude, float(np.median(np.diff(order)))
         own = max(0.5 * step, FINEST) if step < 0.5 else FINEST
-        tolerance = _checked_tolerance(own if tolerance is None else tolerance, step)
+        within = _checked_tolerance(own if tolerance is None else tolerance, step)
         lines = find_lines(order, amplitude, threshold=threshold)
         order, level = order[lines], 20 * np.log10(amplitude[lines] / amplitude[lines].max(initial=0.0))
-        found = [classify_line(one, known.angles, known.teeth, tolerance=tolerance) for one in order]
+        found = classify_lines(order.tolist(), known.angles, known.teeth, tolerance=within)
         rows = [
             (float(o), float(v), one.nearest, one.factor, one.verdict, one.reason)
             for o, v, one in zip(order, level, found)
@@ -132,7 +134,7 @@ def main(
     _write_factors(folder / FACTORS, known, harmonics, half_width)
     if spectrum is not None:
         write_csv(folder / LINES, HEADER, rows)
-        _print_lines(measured.name, rows, threshold, tolerance, known)
+        _print_lines(measured.name, rows, threshold, within, known, {one.part for one in found})
     lines_of = {word: [(row[0], row[1]) for row in rows if row[4] == word] for word in (NORMAL, UNEQUAL, FOREIGN)}
     drawn = {"threshold": threshold, "harmonics": range(1, harmonics + 1), "half_width": half_width}
     save_figure(draw_side_bands(known, lines_of if rows else {}, **drawn), folder / PICTURE)
@@ -316,17 +318,16 @@ def _write_factors(path: Path, known: HeardSet, harmonics: int, half_width: int)
     write_csv(path, ("mesh harmonic", "carrier order", "array factor", "symmetry"), rows)
 
 
-def _print_lines(name: str, rows, threshold: float, tolerance: float, known: HeardSet) -> None:
+def _print_lines(name: str, rows, threshold: float, tolerance: float, known: HeardSet, heard: Collection[str]) -> None:
     strongest = sorted(sorted(rows, key=lambda row: -row[1])[:SHOWN])
     shown = [(f"{o:.7g}", f"{v:.1f}", f"{n}", f"{f:.3f}", *words) for o, v, n, f, *words in strongest]
     title = f"{name}: {len(rows)} lines above {threshold:g} dB, orders within {tolerance:.3g} count as one"
     print_table(title + (f", the strongest {SHOWN}" if len(rows) > SHOWN else ""), HEADER, shown)
     counts = ((word, sum(row[4] == word for row in rows)) for word in (NORMAL, UNEQUAL, FOREIGN))
     print(", ".join(f"{count} {word}" for word, count in counts))
-    parts = sum(one is not None for one in known.teeth[1:])
-    if parts:
-        chance = 1 - (1 - 2 * tolerance) ** (4 * parts)
-        print(f"an order without meaning fits turns of sun or planet by chance in {chance:.0%} of cases at most")
+    if any(known.teeth[1:]):
+        likely = chance(tolerance, known.teeth, spacing_symmetry(known.angles), heard)
+        print(f"an order without meaning fits turns of sun or planet by chance in {likely:.0%} of cases at most")
 
 
 if __name__ == "__main__":

@@ -7,7 +7,6 @@ from recorded_signals import CASE, COARSE, HEALTHY, RATE, computed_lines, record
 from femgear import causes, read_case, solve
 from femgear.causes import CAUSES, describe_causes, rank_causes
 from femgear.errors import CaseError
-from femgear.housing.orders import FOREIGN
 from femgear.measured.requests import LineSearch, Recording
 from femgear.measured.verdict import measured_verdict
 from femgear.trains.reading import with_values
@@ -111,17 +110,6 @@ def test_faults_of_the_part_whose_turns_are_heard_are_tried(tmp_path, known_line
     assert likeness["missing tooth of the planet"] < 0.01
     assert likeness["spall on a tooth of the planet"] < 0.7
     assert not any(name.endswith("the sun") and "tooth" in name for name in likeness)
-
-
-def test_lines_at_many_turns_of_a_part_that_is_heard_are_of_this_set(tmp_path):
-    """Planets turn by 2.7 a turn of the carrier: 337.5 is five of these, which the verdict does not count, and 324."""
-    both = HEALTHY | {326.7: 0.2, 337.5: 0.2, 337.55: 0.2}
-    verdict = verdict_of(tmp_path, both, both.values())
-    foreign = {round(line.order, 2): line for line in verdict.lines if line.place.verdict == FOREIGN}
-    assert [order for order, line in foreign.items() if causes._from_this_set(line, verdict)] == [337.5]
-    alone = HEALTHY | {337.5: 0.2}
-    verdict = verdict_of(tmp_path, alone, alone.values())
-    assert not any(causes._from_this_set(line, verdict) for line in verdict.lines)
 
 
 @pytest.mark.slow

@@ -18,7 +18,7 @@ from femgear.case.quantities import ANGLE, LENGTH, Count, Quantity, Section, Val
 from femgear.errors import CaseError, GeometryError
 from femgear.gears.cracked_tooth import check_crack
 from femgear.gears.faults import LEFT, RIGHT, BrokenTip, Crack, MissingTooth, Spall, ToothFault, Wear
-from femgear.gears.gear import Gear
+from femgear.gears.gear import Gear, tooth_thickness
 from femgear.gears.modifications import roll_at
 
 if TYPE_CHECKING:
@@ -110,9 +110,10 @@ def keyed_faults(case: Any, gears: GearSet) -> Iterator[tuple[str, ToothFault]]:
     """Make the faults of the teeth of all gears of a case, with their entries; without depth there is none.
 
     GeometryError, with the entry and its place in the file: a tooth or a planet that there is not (E-RANGE), a place
-    that is not on the flank, a crack that the tooth cannot have or that is not the only one of its body (E-FAULT).
+    that is not on the flank, a crack that the tooth cannot have or that is not the only one of its body, wear deeper
+    than the tooth is thick, a gear that misses all teeth (E-FAULT).
     """
-    cracked = set()
+    cracked, missing = set(), set()
     for number, gear in enumerate(gears.gears):
         for i, section in enumerate(getattr(case, gear.name).fault):
             key = f"{gear.name}.fault[{i}]"
@@ -124,6 +125,11 @@ def keyed_faults(case: Any, gears: GearSet) -> Iterator[tuple[str, ToothFault]]:
                             "a body has one crack", code="E-FAULT", key="kind", remedy="keep one of them"
                         )
                     cracked.add((number, fault.copy))
+                if isinstance(fault, MissingTooth):
+                    missing.add((fault.tooth, (number, fault.copy)))
+                    if sum(body == (number, fault.copy) for *_, body in missing) == gear.teeth:
+                        message, remedy = f"{gear.name} misses all its teeth", "leave some"
+                        raise GeometryError(message, code="E-FAULT", key="kind", remedy=remedy)
             except GeometryError as error:
                 error.key = f"{key}.{error.key}"
                 error.file = case.location(error.key)
@@ -197,11 +203,30 @@ def _spall(section: FaultSection, gear: Gear, place: dict[str, Any]) -> Spall:
 
 
 def _wear(section: FaultSection, gear: Gear, place: dict[str, Any]) -> Wear:
+    """Wear by its depth, or depths over diameters; deeper than the tooth is thick there it leaves no tooth."""
     if section.depth is not None:
         ends = sorted((gear.form_roll, gear.tip_roll))
+        _check_thickness(gear, gear.tip_radius, section.depth, "depth")  # a tooth is thinnest at its tip
         return Wear(**place, roll=tuple(ends), depth=(section.depth,) * 2)
+    low, high = sorted((gear.form_radius, gear.tip_radius))
+    for diameter, depth in zip(section.diameters or (), section.depths or ()):
+        _check_thickness(gear, min(max(0.5 * diameter, low), high), depth, "depths")
     rolls = [roll_at(gear, diameter=diameter) for diameter in section.diameters or ()]
     return Wear(**place, roll=tuple(roll or 0.0 for roll in rolls), depth=section.depths or ())
+
+
+def _check_thickness(gear: Gear, radius: float, depth: float, key: str) -> None:
+    """Refuse wear (GeometryError, E-FAULT) as deep as the tooth is thick at a radius [m]."""
+    thickness = float(tooth_thickness(gear, radius))
+    if not depth < thickness:
+        raise GeometryError(
+            f"{gear.name}: at a diameter of {_mm(2 * radius)} the wear leaves no tooth",
+            code="E-FAULT",
+            key=key,
+            value=_mm(depth),
+            limit=f"less than {_mm(thickness)}, as thick as the tooth is there",
+            remedy='reduce it, or write kind = "broken corner" or "missing"',
+        )
 
 
 def _roll(gear: Gear, radius: float) -> float:

@@ -127,7 +127,7 @@ def solve_step(problem: ComplementarityProblem, active: np.ndarray) -> Step:
     scale = np.abs(elastic).max(initial=0.0)
     blocked = forced = np.zeros(0, int)
     if null.shape[1]:
-        shift, blocked, forced = settle(problem.G, problem.load, problem.arm, null, gaps, active)
+        shift, blocked, forced = settle(problem.G, problem.load, null, gaps, active)
         motions = motions + null @ shift
         # the multipliers of the least distance problem carry the rounding of its largest row
         scale += 10 * np.abs(problem.G @ (null @ shift)).max(initial=0.0)
@@ -190,14 +190,14 @@ def _residual(problem: ComplementarityProblem, active, loads, gaps) -> float:
     return float(max(touching / length, penetration / length, pull / force, imbalance / force))
 
 
-def settle(G, load, arm, null, gaps, active):
+def settle(G, load, null, gaps, active):
     """Move what no touching candidate restrains: the shift, who cannot be judged, who must touch.
 
     ContactError: E-CONTACT-OPEN when no candidate can balance the load.
 
     Parameters
     ----------
-    G, load, arm : (n, m), (m,), (m,) arrays
+    G, load : (n, m), (m,) arrays
         Of a `ComplementarityProblem`.
     null : (m, k) array
         Motions that no touching candidate restrains.
@@ -223,8 +223,7 @@ def settle(G, load, arm, null, gaps, active):
             raise ContactError(
                 "no candidate can balance the load: the contacts cannot push in its direction",
                 code="E-CONTACT-OPEN",
-                value=(load * arm).tolist(),
-                remedy="check the sign of the load and that every mesh has candidates",
+                remedy="check the sign of the load, and that the faults leave teeth that can carry it",
             )
         first = moved[meets][np.argmin(gaps[moved[meets]] / speed[meets])]
         return np.zeros(len(pull)), moved, np.array([first])

@@ -536,7 +536,7 @@ class _ActiveSets:
                 gaps = np.append(gaps, np.full(len(self.arms), self.clearance))
                 active = np.append(active, self.springs[todo[at]])
             motions[at] -= free @ (free.T @ motions[at])
-            shift, *numbers = settle(arms, self.load, self.arm, free, gaps - arms @ motions[at], active)
+            shift, *numbers = settle(arms, self.load, free, gaps - arms @ motions[at], active)
             motions[at] += free @ shift
             turned[at] = np.abs(arms @ (free @ shift)).max(initial=0.0)
             for (cells, springs), chosen in zip((blocked, forced), numbers, strict=True):

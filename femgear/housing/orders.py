@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from dataclasses import dataclass
-from itertools import product
+from fractions import Fraction
 
 import numpy as np
 
@@ -139,8 +139,9 @@ def array_factor(planet_angles, order) -> np.ndarray:
 
 NORMAL, UNEQUAL, FOREIGN = "normal", "needs unequal turning parts", "not from this stage"
 """Verdicts on a line."""
-_MOST_TURNS = 2
-"""Turns of a part in a line: a planet that hits sun and ring meets one of them twice a turn."""
+MOST_TURNS = 2
+"""Turns of a part in a line, unless it is heard: a planet that hits sun and ring meets one of them twice a turn."""
+_NO_TURNS = ", nor at one or two turns of sun or planet"
 _ZERO = 5e-4
 """Array factor that angles given to a thousandth of a degree may leave where there is none."""
 
@@ -177,8 +178,31 @@ def spacing_symmetry(planet_angles) -> int:
     return next(len(place) - i for i, difference in enumerate(turned) if np.abs(difference).min(axis=1).max() < 1e-5)
 
 
+def classify_lines(
+    orders, planet_angles, teeth: tuple[int, int | None, int | None], *, tolerance: float
+) -> tuple[LineVerdict, ...]:
+    """Classify all lines (k,) of a record as `classify_line`; of a part that is heard at more of its turns too.
+
+    A tooth that hits once a turn makes lines at all turns of its gear. They are counted where lines at one or two of
+    them stand in the record: else the many turns would explain almost any line.
+    """
+    first = [classify_line(order, planet_angles, teeth, tolerance=tolerance) for order in orders]
+    heard = frozenset(place.part for place in first if place.part)
+    if not heard:
+        return tuple(first)
+    return tuple(
+        classify_line(order, planet_angles, teeth, tolerance=tolerance, heard=heard) if one.verdict == FOREIGN else one
+        for order, one in zip(orders, first, strict=True)
+    )
+
+
 def classify_line(
-    order: float, planet_angles, teeth: tuple[int, int | None, int | None], *, tolerance: float
+    order: float,
+    planet_angles,
+    teeth: tuple[int, int | None, int | None],
+    *,
+    tolerance: float,
+    heard: Collection[str] = (),
 ) -> LineVerdict:
     """Tell whether a healthy set makes a line that is heard on its housing, and what else would.
 
@@ -201,6 +225,9 @@ def classify_line(
     tolerance : float
         Distance of orders that are taken as one, below a half: about half the resolution of the spectrum. An
         order without meaning fits one of four turns of a part by chance in ``8 tolerance`` of all cases.
+    heard : collection of str
+        Parts, "sun" or "planet", whose lines at one or two turns the record has: they count at all turns, unless these
+        lie closer than four tolerances and would explain most orders.
     """
     if not (0 < order < np.inf and 0 < tolerance < 0.5):
         message, limit = "no such line", "a finite order above 0, 0 < tolerance < 0.5"
@@ -211,27 +238,49 @@ def classify_line(
         shared = "factor zero: by sun and ring, which unequally spaced planets share"
         return LineVerdict(nearest, factor, NORMAL, "" if factor > _ZERO else shared)
     turns = [turn for turn in _turns(order, teeth, g, tolerance) if not (whole and turn[1])]
+    if heard and not whole and not turns:
+        turns = list(_turns(order, teeth, g, tolerance, heard))
     *_, turned, part = min(turns, key=lambda turn: turn[0] + turn[1]) if turns else ("", "")
     if whole:
         words = f"no multiple of {g}" + (f"; {turned}" if turned else "")
         return LineVerdict(nearest, factor, UNEQUAL, words)
-    return LineVerdict(nearest, factor, UNEQUAL if turned else FOREIGN, turned or "no whole carrier order", part)
+    if turned:
+        return LineVerdict(nearest, factor, UNEQUAL, turned, part)
+    return LineVerdict(nearest, factor, FOREIGN, "no whole carrier order" + (_NO_TURNS if any(teeth[1:]) else ""))
 
 
-def _turns(order: float, teeth, symmetry: int, tolerance: float) -> Iterator[tuple[int, int, str, str]]:
+def _turns(
+    order: float, teeth, symmetry: int, tolerance: float, heard: Collection[str] = ()
+) -> Iterator[tuple[int, int, str, str]]:
     """Turns of sun and planet that give an order: how many, carrier orders beside a mesh harmonic, words, part."""
     ring, sun, planet = teeth
     parts = (("the sun", sun and sun_ratio(sun, ring), symmetry), ("a planet", planet and ring / planet, 1))
-    for (name, rate, step), k in product(parts, [turn for n in range(1, _MOST_TURNS + 1) for turn in (n, -n)]):
+    for name, rate, step in parts:
         if not rate:
             continue
-        rest = order - k * rate
-        whole, harmonic = round(rest), max(round(rest / ring), 0) * ring
-        if abs(rest - whole) <= tolerance and whole % step == 0:
-            n, beside = abs(k), whole - harmonic
-            words = f"{harmonic} {'+' if k > 0 else '-'} {n} turn{'s' * (n > 1)} of {name}"
-            words += f" {'+' if beside > 0 else '-'} {abs(beside)}" if beside else ""
-            yield n, abs(beside), words, name.split()[-1]
+        part = name.split()[-1]
+        most = counted_turns(part, teeth, symmetry, tolerance) if part in heard else MOST_TURNS
+        for k in (turn for n in range(1, most + 1) for turn in (n, -n)):
+            rest = order - k * rate
+            whole, harmonic = round(rest), max(round(rest / ring), 0) * ring
+            if abs(rest - whole) <= tolerance and whole % step == 0:
+                n, beside = abs(k), whole - harmonic
+                words = f"{harmonic} {'+' if k > 0 else '-'} {n} turn{'s' * (n > 1)} of {name}"
+                words += f" {'+' if beside > 0 else '-'} {abs(beside)}" if beside else ""
+                yield n, abs(beside), words, part
+
+
+def counted_turns(part: str, teeth, symmetry: int, tolerance: float) -> int:
+    """Most turns of a part that count where it is heard: all that give other orders than fewer do, but two at least.
+
+    Orders of healthy sets are multiples of a step, ``symmetry`` for errors of the sun and 1 for those of one planet. A
+    turn over that step is a fraction; after as many turns as its denominator the orders repeat. ``q + 2.7 m`` of all m
+    has ten places from one whole order to the next. Where places lie within four tolerances, two turns count.
+    """
+    ring, sun, planet = teeth
+    step = symmetry if part == "sun" else 1
+    places = (Fraction(ring + sun, sun * step) if part == "sun" else Fraction(ring, planet)).denominator
+    return max(places // 2, MOST_TURNS) if step > 4 * tolerance * places else MOST_TURNS
 
 
 def find_lines(order, amplitude, *, threshold: float) -> np.ndarray:

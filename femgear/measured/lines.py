@@ -2,12 +2,23 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import dataclass
 
 import numpy as np
 
 from femgear.errors import CaseError
-from femgear.housing.orders import FOREIGN, NORMAL, UNEQUAL, LineVerdict, OrderSpectrum, classify_line, find_lines
+from femgear.housing.orders import (
+    FOREIGN,
+    MOST_TURNS,
+    NORMAL,
+    UNEQUAL,
+    LineVerdict,
+    OrderSpectrum,
+    classify_lines,
+    counted_turns,
+    find_lines,
+)
 
 FINEST = 0.02
 """Orders that a record of 50 turns of the carrier tells apart, halved."""
@@ -26,7 +37,7 @@ class MeasuredLine:
     """One line of a measured spectrum.
 
     ``order`` of the carrier, ``amplitude`` (peak) in the unit of the signal, ``level`` [dB] over the strongest line,
-    ``verdict`` one of `VERDICTS`, ``place`` what `classify_line` says of its place.
+    ``verdict`` one of `VERDICTS`, ``place`` what `classify_lines` says of its place.
     """
 
     order: float
@@ -61,7 +72,7 @@ def sharpened_lines(spectrum: OrderSpectrum, threshold: float) -> tuple[np.ndarr
 def judge_lines(
     order: np.ndarray, amplitude: np.ndarray, planet_angles, teeth: tuple[int, int | None, int | None], tolerance: float
 ) -> tuple[MeasuredLine, ...]:
-    """Give every line of a spectrum its verdict, by `femgear.housing.orders.classify_line`.
+    """Give every line of a spectrum its verdict, by `femgear.housing.orders.classify_lines`.
 
     Parameters
     ----------
@@ -75,9 +86,9 @@ def judge_lines(
         Distance of orders that count as one.
     """
     largest = amplitude.max(initial=0.0)
-    lines = []
-    for line_order, height in zip(np.asarray(order, float).tolist(), np.asarray(amplitude, float).tolist()):
-        place = classify_line(line_order, planet_angles, teeth, tolerance=tolerance)
+    lines, orders = [], np.asarray(order, float).tolist()
+    places = classify_lines(orders, planet_angles, teeth, tolerance=tolerance)
+    for line_order, height, place in zip(orders, np.asarray(amplitude, float).tolist(), places, strict=True):
         lines.append(MeasuredLine(line_order, height, 20 * float(np.log10(height / largest)), _words(place), place))
     return tuple(lines)
 
@@ -109,6 +120,11 @@ def order_tolerance(turns: int, given: float | None = None) -> float:
     return tolerance
 
 
-def chance(tolerance: float, parts: int) -> float:
-    """Tell how often an order without meaning fits turns of so many parts by chance, at most."""
-    return 1.0 - (1.0 - 2.0 * tolerance) ** (4 * parts)
+def chance(tolerance: float, teeth: tuple[int, int | None, int | None], symmetry: int, heard: Collection[str]) -> float:
+    """Tell how often an order without meaning fits turns of the parts by chance, at most; of those heard at any."""
+    counts = (
+        2 * (counted_turns(part, teeth, symmetry, tolerance) if part in heard else MOST_TURNS)
+        for part, number in zip(("sun", "planet"), teeth[1:], strict=True)
+        if number is not None
+    )
+    return 1.0 - (1.0 - 2.0 * tolerance) ** sum(counts)

@@ -148,7 +148,10 @@ def _carrier_speed(signal: Channel, recording: Recording, shafts: HeardSet) -> f
     if abs(best / speed - 1.0) * shafts.ring > _OFF:
         rpm = 60.0 / shafts.carrier_per_turn[shafts.input]
         words = f"lines stand best on orders of the set at {best * rpm:.6g} rpm, not at {speed * rpm:.6g} rpm"
-        remedy = f"give --within {1.2 * abs(best / speed - 1.0):.2g}, or record pulses"
+        enough, most = f"{1.2 * abs(best / speed - 1.0):.2g}", widest_range(orders)
+        remedy = "record pulses of a turn, or give the speed itself"
+        if float(enough) <= most:
+            remedy = f"give --within {enough}, or record pulses"
         tell(Finding("W-UNSTEADY", "--speed", words, remedy=remedy))
     return speed
 

@@ -363,6 +363,8 @@ def judge_heat(results: Any) -> Iterator[Judgement]:
 def judge_smoothness(answer: str, results: Any, stages: Sequence[str]) -> Judgement:
     """Judge the run by what speaks against it: teeth that part or press on both flanks, motions that are not stable.
 
+    So do planets that carry nothing at some positions, and mesh forces that are cut short.
+
     Parameters
     ----------
     answer : str
@@ -377,6 +379,8 @@ def judge_smoothness(answer: str, results: Any, stages: Sequence[str]) -> Judgem
     against = list(dict.fromkeys(_against(results, present)))
     if not against and any(finding.code == "W-TAIL" and finding.severity == DOUBT for finding in results.findings):
         return _smoothness("look", answer, "mesh forces are cut short")
+    if not against and any(finding.code == "W-OPEN" for finding in results.findings):
+        return _smoothness("look", answer, "a planet carries nothing at some positions")
     if not against:
         judged = any("stable" in results[stage] for stage in present)
         words = "teeth stay in contact, motions are stable" if judged else "teeth stay in contact"

@@ -7,15 +7,16 @@ from the seed and the number i. Teeth are solved once for all speeds of a machin
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from itertools import product
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from femgear.case.dependencies import Steps, fingerprint
-from femgear.case.fault_sections import no_faults
+from femgear.case.fault_sections import keyed_faults, no_faults
 from femgear.case.gear_set import planetary_set
 from femgear.case.quantities import FREQUENCY, SPEED, TIME, TORQUE, Dimension, to_si
 from femgear.errors import CaseError, FemgearError
@@ -25,7 +26,16 @@ from femgear.stages.fault_orders import need_fixed_ring
 from femgear.stages.protocol import one_blas_thread
 from femgear.stages.static import LARGEST_APPROACH, static_without_load
 from femgear.study.fault_request import FaultRequest
-from femgear.study.fault_sizes import GEARS, KINDS, FaultPlace, chosen_words, drawn_fault, fault_entries, size_ranges
+from femgear.study.fault_sizes import (
+    GEARS,
+    KINDS,
+    SIZED,
+    FaultPlace,
+    chosen_words,
+    drawn_fault,
+    fault_entries,
+    size_ranges,
+)
 from femgear.study.objectives import need_elastic_ring
 from femgear.study.samples import SampleModel, checked, drawn_alone, sample_case
 from femgear.trains.elastic import stages as elastic_stages
@@ -151,13 +161,16 @@ def fault_plan(
     to_si(up_to, FREQUENCY, low=10.0)
     common = {"dynamics.up_to": up_to, "static.stresses": False, "housing.published": None, "housing.measured": None}
     case = with_values(case, common)
+    kinds, places = chosen_words(request.kinds, KINDS, "--kinds"), chosen_words(request.gears, GEARS, "--gears")
+    sizes = size_ranges(request.sizes, gears.sun.module)
+    _check_largest(case, kinds, places, sizes)
     steps = Steps()
     plan = FaultPlan(
         case,
         None if tolerances is None else drawn_alone(case, tolerances, cache=cache, steps=steps),
-        chosen_words(request.kinds, KINDS, "--kinds"),
-        chosen_words(request.gears, GEARS, "--gears"),
-        size_ranges(request.sizes, gears.sun.module),
+        kinds,
+        places,
+        sizes,
         _range(request.speeds, SPEED, (0.5 * fastest, fastest), "--speeds"),
         _range(request.torques, TORQUE, (0.5 * torque, torque), "--torques"),
         request.each,
@@ -170,6 +183,21 @@ def fault_plan(
     )
     solved_lines(case, cache=cache, steps=steps)  # what all machines share stays in the steps
     return plan
+
+
+def _check_largest(
+    case: Any, kinds: Sequence[str], places: Sequence[str], sizes: Mapping[str, tuple[float, float]]
+) -> None:
+    """Refuse sizes (CaseError, E-RANGE) of which the largest cannot be on a flank of a gear that may have it."""
+    gears, back = planetary_set(case), case.torque_on_first_gear() < 0.0
+    for kind, gear, flank in product((kind for kind in kinds if kind in SIZED), places, (0.0, 0.5)):
+        fault = drawn_fault(kind, gears, (gear,), sizes, np.array([0.0, 0.0, 0.0, flank, 1.0]), back=back)
+        try:
+            list(keyed_faults(with_values(case, fault_entries(fault, gears)), gears))
+        except FemgearError as error:
+            value, limit = f"{kind} of {1e3 * fault.size:.5g} mm", f"of {gear}: {error.limit}"
+            message = f"the largest size cannot be: {error.message}"
+            raise CaseError(message, code="E-RANGE", key="--sizes", value=value, limit=limit) from error
 
 
 def _range(
@@ -255,9 +283,7 @@ def solve_machine(plan: FaultPlan, machine: int) -> MachineRecords:
     try:
         lines = solved_lines(case, cache=plan.cache, steps=plan.steps)
     except FemgearError as error:
-        return MachineRecords(
-            machine, case, fault, errors, 2.0 * np.pi * shares, signal, None, f"[{error.code}] {error}"
-        )
+        return MachineRecords(machine, case, fault, errors, 2.0 * np.pi * shares, signal, None, str(error))
     angle = 2.0 * np.pi * lines.turns * shares
     for row, number in enumerate(numbers):
         values = lines.acceleration[row] * np.exp(1j * lines.order * angle[row])

@@ -5,10 +5,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from femgear.case.fault_sections import FaultSection, PlanetFaultSection, no_faults
+from femgear.case.fault_sections import FaultSection, PlanetFaultSection, keyed_faults, no_faults
 from femgear.case.gear_set import planetary_set, set_deviations
 from femgear.errors import CaseError, GeometryError
 from femgear.gears.faults import LEFT, RIGHT, BrokenTip, MissingTooth, Spall, Wear, missing_length
+from femgear.gears.gear import tooth_thickness
 from femgear.stages.static import check_slices
 from femgear.study.relief import design_basis
 from femgear.trains.reading import read_case, with_values
@@ -50,6 +51,22 @@ def test_what_does_not_belong_together_is_refused(entries, code, words):
 def test_flanks_of_a_planet_are_named_by_their_mates():
     with pytest.raises(ValueError, match="sun side"):
         PlanetFaultSection.model_validate(WEAR)
+
+
+def test_faults_that_leave_no_tooth_are_refused(healthy):
+    tip = tooth_thickness(planetary_set(healthy).sun, planetary_set(healthy).sun.tip_radius)
+    allowed = with_values(healthy, {"sun.fault": [WEAR | {"depth": f"{0.99e3 * tip:.6f} mm"}]})
+    assert len(list(keyed_faults(allowed, planetary_set(healthy)))) == 1
+    for depths in ({"depth": f"{1.01e3 * tip:.6f} mm"}, {"depths": ["0 um", "8 mm"], "diameters": ["41 mm", "42 mm"]}):
+        worn = with_values(healthy, {"sun.fault": [{"kind": "wear", "flank": "left"} | depths]})
+        with pytest.raises(GeometryError, match="the wear leaves no tooth") as caught:
+            list(keyed_faults(worn, planetary_set(healthy)))
+        assert caught.value.code == "E-FAULT" and "as thick as the tooth is" in (caught.value.limit or "")
+    gaps = [{"kind": "missing", "tooth": tooth} for tooth in range(27)]
+    some, none = (with_values(healthy, {"sun.fault": gaps[:count]}) for count in (26, 27))
+    assert len(list(keyed_faults(some, planetary_set(healthy)))) == 26
+    with pytest.raises(GeometryError, match="sun misses all its teeth"):
+        list(keyed_faults(none, planetary_set(healthy)))
 
 
 def test_faults_are_made_of_their_gears(healthy):

@@ -13,7 +13,9 @@ from femgear.housing.orders import (
     analytic_signal,
     band_pass,
     classify_line,
+    classify_lines,
     count_lobes,
+    counted_turns,
     dominant_lines,
     find_lines,
     order_spectrum,
@@ -222,6 +224,23 @@ def test_verdicts_on_lines(name, order, verdict, reason):
     assert found.nearest == round(order)
     without = classify_line(order, angles, (70, None, None), tolerance=0.05)
     assert without.verdict == (FOREIGN if "turn" in reason else verdict)
+
+
+def test_a_part_that_is_heard_has_lines_at_all_its_turns():
+    """27/40/108: a planet turns 2.7 times, so a tooth that hits once a turn makes lines at all tenths of an order."""
+    angles, teeth = np.radians([0.0, 120.0, 240.0]), (108, 27, 40)
+    orders = 108 + 2.7 * np.array([1, 3, 4, 6, 9])
+    first, *others = classify_lines(orders, angles, teeth, tolerance=0.02)
+    assert (first.reason, first.part) == ("108 + 1 turn of a planet", "planet")
+    assert {(one.verdict, one.part) for one in others} == {(UNEQUAL, "planet")}
+    assert others[0].reason.startswith("108 + 3 turns of a planet")
+    # without a line at one or two turns, off all turns, and where they lie as close as the tolerance
+    for alone in classify_lines(orders[[1, 2, 3]], angles, teeth, tolerance=0.02):
+        assert alone.verdict == FOREIGN and "nor at one or two turns" in alone.reason
+    assert classify_lines([110.7, 108.25], angles, teeth, tolerance=0.02)[1].verdict == FOREIGN
+    assert [counted_turns("planet", teeth, 3, tolerance) for tolerance in (0.02, 0.025, 0.03)] == [5, 2, 2]
+    assert counted_turns("planet", (95, 31, 31), 3, 0.02) == 2
+    assert counted_turns("planet", (95, 31, 31), 3, 0.005) == 15
 
 
 def test_whole_turns_of_the_sun_are_named_where_they_stand_beside_a_mesh_harmonic():

@@ -46,4 +46,6 @@ def test_tolerances_fit_the_record():
     for turns, given in ((10, 0.04), (10, 0.25), (2, None)):
         with pytest.raises(CaseError, match="does not fit the record"):
             order_tolerance(turns, given)
-    assert chance(0.02, 2) == pytest.approx(0.28, abs=0.01)
+    assert chance(0.02, (70, 30, 20), 1, ()) == pytest.approx(0.28, abs=0.01)
+    # ten places, a tolerance on either side
+    assert chance(0.02, (108, None, 40), 3, {"planet"}) == pytest.approx(1 - 0.96**10)

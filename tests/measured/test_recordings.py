@@ -1,5 +1,7 @@
 """femgear.measured.recordings: files of all formats by the end of their names, and what tells their angle."""
 
+import re
+
 import numpy as np
 import pytest
 import pyuff
@@ -80,6 +82,18 @@ def test_a_constant_speed_that_is_none_is_told(speed, within, wander, words, tmp
     assert (told == []) if words is None else (words in told[0] and "W-UNSTEADY" in told[0])
     if not wander:
         assert over_angle.speed == pytest.approx(speed if within else 3.0, rel=1e-3)
+
+
+@pytest.mark.parametrize("carrier", [3.006, 3.0126])
+def test_a_range_that_is_advised_is_allowed(carrier, tmp_path, recwarn):
+    signal, _, _ = recording(HEALTHY, HEALTHY.values(), seconds=6.0, carrier=carrier)
+    path = write_columns(tmp_path / "a.csv", "time [s];acc\n", (np.arange(len(signal)) / RATE, signal))
+    read_by_turns(path, Recording(speed="900 rpm"), HEARD)
+    (text,) = (str(warning.message) for warning in recwarn)
+    if advised := re.search(r"give --within ([\d.]+)", text):
+        read_by_turns(path, Recording(speed="900 rpm", within=float(advised[1])), HEARD)
+    assert bool(advised) == (carrier == 3.006)
+    assert advised or "record pulses of a turn" in text
 
 
 def test_accelerations_come_in_si_units(tmp_path):

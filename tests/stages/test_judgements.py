@@ -197,6 +197,9 @@ def test_a_run_is_smooth_unless_teeth_part_or_motions_grow():
     pulled.findings = (Finding("W-TAIL", "", "it ends short", severity=DOUBT),)
     short = judge_smoothness("", pulled, ("dynamics",))
     assert (short.state, short.answer) == ("look", "mesh forces are cut short")
+    pulled.findings = (Finding("W-OPEN", "", "planet 2 carries nothing"),)
+    unloaded = judge_smoothness("", pulled, ("dynamics",))
+    assert (unloaded.state, unloaded.answer) == ("look", "a planet carries nothing at some positions")
     # of motions whose stability nothing tells nothing is said
     pulled.findings = ()
     assert judge_smoothness("", pulled, ("dynamics",)).answer == "teeth stay in contact"

@@ -117,6 +117,8 @@ def test_noise_may_be_none(case):
         ({}, {"count": 0}, "E-RANGE"),
         ({}, {"kinds": ("creak",)}, "E-CHOICE"),
         ({}, {"duration": "1 h"}, "E-RANGE"),
+        ({}, {"kinds": ("crack",), "sizes": ("crack=1 mm..50 mm",)}, "E-RANGE"),
+        ({}, {"kinds": ("wear",), "sizes": ("wear=1 um..5 mm",)}, "E-RANGE"),
     ],
 )
 def test_what_cannot_be_recorded_is_refused(case, values, request_, code):
