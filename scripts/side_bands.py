@@ -318,7 +318,9 @@ def _write_factors(path: Path, known: HeardSet, harmonics: int, half_width: int)
     write_csv(path, ("mesh harmonic", "carrier order", "array factor", "symmetry"), rows)
 
 
-def _print_lines(name: str, rows, threshold: float, tolerance: float, known: HeardSet, heard: Collection[str]) -> None:
+def _print_lines(
+    name: str, rows, threshold: float, tolerance: float, known: HeardSet, heard_parts: Collection[str]
+) -> None:
     strongest = sorted(sorted(rows, key=lambda row: -row[1])[:SHOWN])
     shown = [(f"{o:.7g}", f"{v:.1f}", f"{n}", f"{f:.3f}", *words) for o, v, n, f, *words in strongest]
     title = f"{name}: {len(rows)} lines above {threshold:g} dB, orders within {tolerance:.3g} count as one"
@@ -326,7 +328,7 @@ def _print_lines(name: str, rows, threshold: float, tolerance: float, known: Hea
     counts = ((word, sum(row[4] == word for row in rows)) for word in (NORMAL, UNEQUAL, FOREIGN))
     print(", ".join(f"{count} {word}" for word, count in counts))
     if any(known.teeth[1:]):
-        likely = chance(tolerance, known.teeth, spacing_symmetry(known.angles), heard)
+        likely = chance(tolerance, known.teeth, spacing_symmetry(known.angles), heard_parts)
         print(f"an order without meaning fits turns of sun or planet by chance in {likely:.0%} of cases at most")
 
 

@@ -187,11 +187,13 @@ def classify_lines(
     them stand in the record: else the many turns would explain almost any line.
     """
     first = [classify_line(order, planet_angles, teeth, tolerance=tolerance) for order in orders]
-    heard = frozenset(place.part for place in first if place.part)
-    if not heard:
+    heard_parts = frozenset(place.part for place in first if place.part)
+    if not heard_parts:
         return tuple(first)
     return tuple(
-        classify_line(order, planet_angles, teeth, tolerance=tolerance, heard=heard) if one.verdict == FOREIGN else one
+        classify_line(order, planet_angles, teeth, tolerance=tolerance, heard_parts=heard_parts)
+        if one.verdict == FOREIGN
+        else one
         for order, one in zip(orders, first, strict=True)
     )
 
@@ -202,7 +204,7 @@ def classify_line(
     teeth: tuple[int, int | None, int | None],
     *,
     tolerance: float,
-    heard: Collection[str] = (),
+    heard_parts: Collection[str] = (),
 ) -> LineVerdict:
     """Tell whether a healthy set makes a line that is heard on its housing, and what else would.
 
@@ -225,7 +227,7 @@ def classify_line(
     tolerance : float
         Distance of orders that are taken as one, below a half: about half the resolution of the spectrum. An
         order without meaning fits one of four turns of a part by chance in ``8 tolerance`` of all cases.
-    heard : collection of str
+    heard_parts : collection of str
         Parts, "sun" or "planet", whose lines at one or two turns the record has: they count at all turns, unless these
         lie closer than four tolerances and would explain most orders.
     """
@@ -238,8 +240,8 @@ def classify_line(
         shared = "factor zero: by sun and ring, which unequally spaced planets share"
         return LineVerdict(nearest, factor, NORMAL, "" if factor > _ZERO else shared)
     turns = [turn for turn in _turns(order, teeth, g, tolerance) if not (whole and turn[1])]
-    if heard and not whole and not turns:
-        turns = list(_turns(order, teeth, g, tolerance, heard))
+    if heard_parts and not whole and not turns:
+        turns = list(_turns(order, teeth, g, tolerance, heard_parts))
     *_, turned, part = min(turns, key=lambda turn: turn[0] + turn[1]) if turns else ("", "")
     if whole:
         words = f"no multiple of {g}" + (f"; {turned}" if turned else "")
@@ -250,7 +252,7 @@ def classify_line(
 
 
 def _turns(
-    order: float, teeth, symmetry: int, tolerance: float, heard: Collection[str] = ()
+    order: float, teeth, symmetry: int, tolerance: float, heard_parts: Collection[str] = ()
 ) -> Iterator[tuple[int, int, str, str]]:
     """Turns of sun and planet that give an order: how many, carrier orders beside a mesh harmonic, words, part."""
     ring, sun, planet = teeth
@@ -259,7 +261,7 @@ def _turns(
         if not rate:
             continue
         part = name.split()[-1]
-        most = counted_turns(part, teeth, symmetry, tolerance) if part in heard else MOST_TURNS
+        most = counted_turns(part, teeth, symmetry, tolerance) if part in heard_parts else MOST_TURNS
         for k in (turn for n in range(1, most + 1) for turn in (n, -n)):
             rest = order - k * rate
             whole, harmonic = round(rest), max(round(rest / ring), 0) * ring

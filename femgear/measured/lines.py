@@ -120,10 +120,12 @@ def order_tolerance(turns: int, given: float | None = None) -> float:
     return tolerance
 
 
-def chance(tolerance: float, teeth: tuple[int, int | None, int | None], symmetry: int, heard: Collection[str]) -> float:
+def chance(
+    tolerance: float, teeth: tuple[int, int | None, int | None], symmetry: int, heard_parts: Collection[str]
+) -> float:
     """Tell how often an order without meaning fits turns of the parts by chance, at most; of those heard at any."""
     counts = (
-        2 * (counted_turns(part, teeth, symmetry, tolerance) if part in heard else MOST_TURNS)
+        2 * (counted_turns(part, teeth, symmetry, tolerance) if part in heard_parts else MOST_TURNS)
         for part, number in zip(("sun", "planet"), teeth[1:], strict=True)
         if number is not None
     )

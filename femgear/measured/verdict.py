@@ -178,9 +178,9 @@ def _notes(verdict: MeasuredVerdict) -> Iterator[str]:
             top = max(lines, key=lambda line: line.level)
             yield f"{word}: strongest {top.level:.1f} dB at order {top.order:.2f}"
     yield "a fault of a tooth of the ring makes no new places: it shows in the heights of normal lines alone"
-    heard = {line.place.part for line in verdict.lines if line.place.part}
+    heard_parts = {line.place.part for line in verdict.lines if line.place.part}
     gear_set = verdict.gear_set
-    likely = chance(verdict.tolerance, gear_set.teeth, spacing_symmetry(gear_set.angles), heard)
+    likely = chance(verdict.tolerance, gear_set.teeth, spacing_symmetry(gear_set.angles), heard_parts)
     yield f"an order without meaning fits turns of sun or planet by chance in {likely:.0%} of cases at most"
 
 
