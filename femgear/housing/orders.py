@@ -192,9 +192,9 @@ def classify_lines(
         return tuple(first)
     return tuple(
         classify_line(order, planet_angles, teeth, tolerance=tolerance, heard_parts=heard_parts)
-        if one.verdict == FOREIGN
-        else one
-        for order, one in zip(orders, first, strict=True)
+        if place.verdict == FOREIGN
+        else place
+        for order, place in zip(orders, first, strict=True)
     )
 
 
