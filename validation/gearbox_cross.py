@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import copy
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -24,6 +24,10 @@ from validation.rows import Row, at_most, information
 AT_ONCE = "both stages in one linear system, validation.reference.stages_at_once"
 SPEEDS = (700.0, 1000.0, 1300.0, 1600.0, 2000.0, 2500.0, 3200.0, 4000.0)
 """Of the input shaft [rpm]."""
+MORE_SPEEDS = (500.0, *SPEEDS, 600.0, 900.0, 1100.0, 1400.0, 1750.0, 2250.0, 2750.0, 3500.0, 3750.0, 4500.0, 5000.0)
+"""Of the input shaft [rpm], for `any_phase`."""
+PHASES = 6
+"""Places in the period of the other mesh at which gears may be mounted."""
 RPM = math.pi / 30.0
 SECOND = {(36, 48): (1, 1), (24, 40): (3, 2), (20, 43): (9, 5)}
 """Teeth of the second pair, and both mesh frequencies over their common one, beside a first pair of 24/36."""
@@ -82,7 +86,7 @@ class TwoStages:
     found : Deflection
         Loaded state.
     response : GearboxResponse
-        At `SPEEDS`.
+        At the speeds.
     stages : tuple of RunningStage
         The pairs.
     structure : MeshedStructure
@@ -122,15 +126,15 @@ class TwoStages:
         return pressed + signals.stiffness[:, [middle]].real * loss * approach, pressed
 
 
-def solve_two_stages(teeth: tuple[int, int]) -> TwoStages:
-    """Solve a first pair of 24/36 and a second one with its teeth."""
+def solve_two_stages(teeth: tuple[int, int], speeds: Sequence[float] = SPEEDS) -> TwoStages:
+    """Solve a first pair of 24/36 and a second one with its teeth at speeds of the input shaft [rpm]."""
     steps = Steps()
     found = solve_deflection(read_case(two_pairs(teeth)), steps=steps)
     stages = [
         running_stage(found, stage, stage_excitation(found.contacts[stage.name], steps=steps)).running
         for stage in found.model.stages
     ]
-    response = solve_gearbox_response(found, RPM * np.array(SPEEDS), steps=steps)
+    response = solve_gearbox_response(found, RPM * np.array(speeds), steps=steps)
     system, loss = linear_system(found)[1], 2.0 * found.model.case.modes.damping_ratio
     structure = MeshedStructure(system.M, system.K, system.W, loss)
     return TwoStages(found, response, tuple(stages), structure, SECOND[teeth])
@@ -181,3 +185,44 @@ def two_stages() -> tuple[Row, ...]:
         text = "change of the r.m.s. of the mesh force, both at once beside one after the other, largest"
         rows.append(information(name, AT_ONCE, text, None, max((case.level for case in known), key=abs)))
     return tuple(rows)
+
+
+def mounted_ahead(signals: MeshSignals, share: float) -> MeshSignals:
+    """Let the second mesh run ahead by a share of the common period."""
+    middle = signals.stiffness.shape[1] // 2
+    ahead = np.exp(2j * math.pi * share * np.arange(-middle, middle + 1))
+    turned = [
+        np.vstack([lines[0], ahead * lines[1]]) for lines in (signals.stiffness, signals.deflection, signals.force)
+    ]
+    return MeshSignals(*turned)
+
+
+def estimates_of_phases(pairs: TwoStages, i: int, a: int) -> tuple[float, np.ndarray]:
+    """Estimate of what stage a leaves out at a speed by its number [N], and what it is for all phases (PHASES,) [N]."""
+    exact = []
+    for number in range(PHASES):
+        signals = mounted_ahead(pairs.signals(i), number / PHASES / math.prod(pairs.multiples))
+        pressed, alone = (pairs.mesh_forces(one, i)[1][a] for one in (signals, signals.without([1 - a])))
+        exact.append(rms(pressed - alone))
+    share = float(pairs.response.cross_excitation[i, a, 1 - a])
+    return share * pairs.response.dynamic_forces[i, a, 0], np.array(exact)
+
+
+def any_phase() -> tuple[Row, ...]:
+    """The estimate beside what is left out for gears that are mounted anyhow: r.m.s. over all phases of the meshes."""
+    rows = list[Row]()
+    for teeth, multiples in [*SECOND.items()][:2]:
+        name = f"24/36 and {teeth[0]}/{teeth[1]}, mesh frequencies {multiples[0]}:{multiples[1]}"
+        pairs = solve_two_stages(teeth, MORE_SPEEDS)
+        known = [estimates_of_phases(pairs, i, a) for i in range(len(MORE_SPEEDS)) for a in (0, 1)]
+        every = [math.log2(estimate / rms_over(exact)) for estimate, exact in known]
+        text = f"force left out, estimate over exact, binary logarithm, r.m.s. over phases, largest of {len(every)}"
+        rows.append(at_most(name, AT_ONCE, text, 1.0, max(every, key=abs)))
+        text = f"the same for one phase, lowest of {PHASES * len(every)}"
+        rows.append(information(name, AT_ONCE, text, None, min(math.log2(one / most.max()) for one, most in known)))
+    return tuple(rows)
+
+
+def rms_over(values: np.ndarray) -> float:
+    """R.m.s. of values (n,)."""
+    return float(np.sqrt((values**2).mean()))

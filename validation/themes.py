@@ -481,6 +481,7 @@ THEMES = (
             gearbox_in_time.six_motions,
             gearbox_power.casing_forces,
             gearbox_cross.two_stages,
+            gearbox_cross.any_phase,
         ),
     ),
     Theme(
