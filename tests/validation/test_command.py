@@ -259,7 +259,7 @@ LONG = {
     "gearbox": {"beams", "images", "on_feet", "rigid_body", "other_trains", "of_files"},
     "gearbox_nonlinear": {"pairs"},
     "gearbox_planets": {"simple_planets"},
-    "gearbox_response": {"on_foundation", "friction_of_stages", "any_phase"},
+    "gearbox_response": {"on_foundation", "friction_of_stages"},
     "heat": {"whole_run"},
     "housing": {"interpolation"},
     "impacts": {"one_term_balance"},
