@@ -65,7 +65,7 @@ def amplitude_and_mean(
         top.plot([], [], "--", color=GREY, label="not stable")
     top.set_ylim(bottom=0.0)
     show_changes(bottom, 0.1)
-    label(top, y=f"amplitude [{unit}]", title=title)
+    label(top, y=f"amplitude\n[{unit}]", title=title)
     label(bottom, x, f"mean [{unit}]")
     legend_below(figure, columns=3)
     return figure
