@@ -32,6 +32,8 @@ STRONG, LIFE, HEAT, SMOOTH, QUIET, SURE = (
 )
 """The questions, in the order of the cards."""
 
+_RAISED = 0.5
+"""Change of a level by a longer excitation from which on the higher one is compared with the limit too [dB]."""
 _BEYOND = "W-PRESSURE", "W-STRENGTH"
 """Codes of the findings that no steel carries the load."""
 
@@ -174,8 +176,12 @@ def _meaning(code: str) -> str:
 
 def _doubts(findings: Iterable[Finding], codes: Sequence[str]) -> str:
     """Name the doubts and faults with some codes; empty of none."""
-    raised = _raised(findings, codes)
-    return f"doubt{'s' * (len(raised) > 1)}: {', '.join(raised)}" if raised else ""
+    return doubt_words(_raised(findings, codes))
+
+
+def doubt_words(codes: Sequence[str]) -> str:
+    """Name doubts by their codes, with marks where these have some; empty of none."""
+    return f"doubt{'s' * (len(codes) > 1)}: {', '.join(codes)}" if codes else ""
 
 
 def stresses_text(root: np.ndarray, pressure: np.ndarray) -> str:
@@ -435,10 +441,20 @@ class LevelMargin:
         return f"{abs(self.decibels):.1f} dB {side} the limit at {self.place}, {self.speed:,.4g} rpm"
 
 
-def margin_of_levels(speed: np.ndarray, decibels: np.ndarray, place: str) -> LevelMargin:
-    """Find the worst of levels (n,) over their limits [dB] at speeds (n,) [rpm]."""
+def margins_of_levels(
+    speed: np.ndarray, decibels: np.ndarray, place: str, change: np.ndarray | float = np.nan
+) -> Iterator[LevelMargin]:
+    """Find the worst of levels (n,) over their limits [dB] at speeds (n,) [rpm], and the worst that may be higher.
+
+    ``change`` (n,) [dB] is what a longer excitation makes of the levels, NaN where it is not known.
+    """
     at = int(np.argmax(decibels))
-    return LevelMargin(float(decibels[at]), float(speed[at]), place)
+    yield LevelMargin(float(decibels[at]), float(speed[at]), place)
+    change = np.nan_to_num(np.broadcast_to(change, decibels.shape), posinf=0.0, neginf=0.0)
+    raised = np.where(change > _RAISED, decibels + change, -np.inf)
+    at = int(np.argmax(raised))
+    if np.isfinite(raised[at]):
+        yield LevelMargin(float(raised[at]), float(speed[at]), f"{place} with a longer excitation")
 
 
 def judge_noise(

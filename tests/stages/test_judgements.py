@@ -22,7 +22,7 @@ from femgear.stages.judgements import (
     least_over_life,
     lives_of_bearings,
     lives_of_teeth,
-    margin_of_levels,
+    margins_of_levels,
     unrated_gears,
     without_life,
 )
@@ -212,7 +212,8 @@ def test_a_level_without_a_limit_is_judged_by_resonances_alone():
 
 def test_a_level_is_judged_by_the_worst_of_its_limits():
     speed = np.array([1000.0, 2000.0, 3000.0])
-    below, over = (margin_of_levels(speed, np.array(values), "foot") for values in ([-9.0, -3.0, -5.0], [-2.0, 1.5, 0]))
+    every = ([-9.0, -3.0, -5.0], [-2.0, 1.5, 0])
+    (below,), (over,) = (tuple(margins_of_levels(speed, np.array(values), "foot")) for values in every)
     holds = judge_noise("1 m/s²", "so", margins=(below,))
     assert (holds.state, holds.limit) == ("good", "3.0 dB below the limit at foot, 2,000 rpm")
     assert judge_noise("1 m/s²", "so", "mode 3 meets mesh harmonic 2", margins=(below,)).state == "look"

@@ -8,10 +8,19 @@ from typing import Any
 import numpy as np
 
 from femgear.case.level_limits import limit_at
+from femgear.report.tables import Marks, is_bound, level_change_at
 from femgear.stages.assumptions import most_decisive
-from femgear.stages.judgements import Judgement, LevelMargin, judge_noise, judge_numbers, margin_of_levels
+from femgear.stages.judgements import (
+    Judgement,
+    LevelMargin,
+    doubt_words,
+    judge_noise,
+    judge_numbers,
+    margins_of_levels,
+)
 from femgear.stages.train_judgements import judge_teeth
-from femgear.trains.elastic.results import known_factors, rate_set
+from femgear.trains.elastic.results import known_factors, level_changes, level_doubts, marked_level, rate_set
+from femgear.trains.elastic.runup import loudest
 
 _MAKES = 0.5
 """Share of the level from which on one resonance makes it."""
@@ -39,7 +48,9 @@ def _noise(results: Any) -> Judgement:
     at_microphone = (
         f" ({float(housing['pressure_level'][at]):.1f} dB(A) at the microphone)" if "pressure_level" in housing else ""
     )
-    answer = f"{level[at]:.3g} m/s²{at_microphone} at {speed:,.4g} rpm"
+    marks = Marks(results.findings)
+    size_words = f"{marked_level(results, at, marks, level_doubts(results, [at]).get(at, ()))} m/s²{at_microphone}"
+    answer = f"{size_words} at {speed:,.4g} rpm"
     carrier = abs(float(housing["carrier_speed"].values[at]))
     orders = housing["order"].values
     size = np.hypot(housing["lines_real"].values[at], housing["lines_imag"].values[at]) * (orders * carrier) ** 2
@@ -49,17 +60,17 @@ def _noise(results: Any) -> Judgement:
     share = 0.5 * (size[line] / level[at]) ** 2 if level[at] > 0.0 else 0.0
     origin = _origin(round(order), results.case.ring.teeth)
     main = f"order {order:g} ({origin}{hertz:,.0f} Hz{_nearest_mode(results, hertz)}) makes {share:.0%} of the power"
-    sentence = f"At {speed:,.4g} rpm the housing has {level[at]:.3g} m/s²{at_microphone}: {main}"
+    sentence = f"At {speed:,.4g} rpm the housing has {size_words}: {main}"
     if decisive := most_decisive(results):
         sentence += f", with half and twice of what is assumed: {decisive}"
-    margins = tuple(_margins(results))
-    if "runup" not in results.stages:
-        return judge_noise(answer, sentence, margins=margins)
-    runup = results.runup
-    worst = int(runup["level"].values.argmax())
-    loudest = float(runup["level"].values[worst])
-    sentence += f". Loudest of the run-up: {loudest:.3g} m/s² at {float(runup['speed'].values[worst]):,.0f} rpm"
-    return judge_noise(answer, sentence, _resonance(runup), margins=margins)
+    margins, resonance, levels = tuple(_margins(results)), "", [size_words]
+    if "runup" in results.stages:
+        levels.append(loudest(results.runup, marks))
+        sentence += f". Loudest of the run-up: {levels[-1]}"
+        resonance = _resonance(results.runup)
+    # a bound has no mark: it is one itself
+    codes = [*(["W-EXCITATION"] if any(map(is_bound, levels)) else []), *marks.codes]
+    return judge_noise(answer, sentence, resonance, margins=margins, doubts=doubt_words(codes))
 
 
 def _margins(results: Any) -> Iterator[LevelMargin]:
@@ -69,10 +80,11 @@ def _margins(results: Any) -> Iterator[LevelMargin]:
         if limits.level_limit and stage in results.stages:
             speed, level = results[stage]["speed"].values, results[stage]["level"].values
             over = np.maximum(level, np.finfo(float).tiny) / limit_at(limits.level_limit, speed)
-            yield margin_of_levels(speed, 20.0 * np.log10(over), "the sensor")
+            change = level_changes(results) if stage == "housing" else level_change_at(results.runup, speed)
+            yield from margins_of_levels(speed, 20.0 * np.log10(over), "the sensor", change)
     if limits.microphone.level_limit and "pressure_level" in results.housing:
         speed, level = results.housing["speed"].values, results.housing["pressure_level"].values
-        yield margin_of_levels(speed, level - limit_at(limits.microphone.level_limit, speed), "the microphone")
+        yield from margins_of_levels(speed, level - limit_at(limits.microphone.level_limit, speed), "the microphone")
 
 
 def _origin(order: int, teeth: int) -> str:

@@ -673,6 +673,12 @@ def level_doubts(results: Results, more: Iterable[int] = ()) -> dict[int, tuple[
     }
 
 
+def marked_level(results: Results, i: int, marks: Marks, codes: Iterable[str]) -> str:
+    """Write the level of the housing at a speed by its number, with marks of what makes it doubtful [m/s^2]."""
+    change = float(level_changes(results)[i])
+    return shown_level(float(results.housing["level"][i]), change, marks, *codes, "W-POINTS", of=_OF_LEVEL)
+
+
 def _all_of(doubts: Mapping[int, tuple[str, ...]]) -> tuple[str, ...]:
     """Codes of any of some speeds, each once."""
     return tuple(dict.fromkeys(code for codes in doubts.values() for code in codes))
@@ -809,14 +815,11 @@ def _operating_points(results: Results, factors: np.ndarray, doubts: Mapping[int
     speeds, shown = dynamics["speed"].values, list(chosen(dynamics.sizes["speed"]))
     marks = Marks(results.findings)
 
-    changes = level_changes(results)
-
     def marked(text: str, i: int) -> str:
         return marks(text, *doubts[i], of=_OF_LEVEL)
 
     def level(i: int) -> str:
-        value, codes = float(results.housing["level"][i]), [*doubts[i], "W-POINTS"]
-        return shown_level(value, changes[i], marks, *codes, of=_OF_LEVEL)
+        return marked_level(results, i, marks, doubts[i])
 
     columns = {
         "speed [rpm]": lambda i: f"{speeds[i]:.6g}",

@@ -15,6 +15,7 @@ from femgear.stages.judgements import (
     Judgement,
     Least,
     LevelMargin,
+    doubt_words,
     judge_heat,
     judge_lives,
     judge_noise,
@@ -24,14 +25,14 @@ from femgear.stages.judgements import (
     least_over_life,
     lives_of_bearings,
     lives_of_teeth,
-    margin_of_levels,
+    margins_of_levels,
     stresses_text,
 )
 from femgear.stages.key_figures import REFERENCE_ACCELERATION
 from femgear.stages.strength import OF_ROOTS
 from femgear.stages.strength_results import SYMBOLS, taken_as_one
 from femgear.trains.gearbox.mode_words import near_mode
-from femgear.trains.gearbox.response_results import LEVEL_CHANGE_TOLD, OF_BOX_RESPONSE, line_origin, main_way
+from femgear.trains.gearbox.response_results import OF_BOX_RESPONSE, line_origin, main_way
 from femgear.trains.gearbox.silence import why_silent
 from femgear.trains.gearbox.strength import least_safety
 
@@ -175,8 +176,8 @@ def _noise(results: Any) -> Judgement:
     if "runup" in results.stages and "level" in results.runup:
         sentence += f". Loudest of the run-up: {_loudest_of_run_up(results.runup, marks, name)}"
     open_words = "give sensor.level_limit, or femgear compare sets two runs beside one another"
-    doubts = f"doubt{'s' * (len(marks.codes) > 1)}: {', '.join(marks.codes)}" if marks.codes else ""
-    return judge_noise(answer, sentence, open_words=open_words, margins=tuple(_margins(results)), doubts=doubts)
+    margins = tuple(_margins(results))
+    return judge_noise(answer, sentence, open_words=open_words, margins=margins, doubts=doubt_words(marks.codes))
 
 
 def _marked(level: float, marks: Marks, stage: str) -> str:
@@ -208,13 +209,8 @@ def _margins(results: Any) -> Iterator[LevelMargin]:
             sensor = names.index(name)
             level = results[stage]["level"].values[:, sensor]
             over = 20.0 * np.log10(np.maximum(level, np.finfo(float).tiny) / limit_at(points, speed))
-            yield margin_of_levels(speed, over, name)
-            if "level_change" not in results[stage]:
-                continue
-            change = np.nan_to_num(results[stage]["level_change"].values[:, sensor], posinf=0.0, neginf=0.0)
-            higher = change > LEVEL_CHANGE_TOLD
-            if higher.any():
-                yield margin_of_levels(speed[higher], (over + change)[higher], f"{name} with a longer excitation")
+            change = results[stage]["level_change"].values[:, sensor] if "level_change" in results[stage] else np.nan
+            yield from margins_of_levels(speed, over, name, change)
 
 
 def _level(level: float) -> str:

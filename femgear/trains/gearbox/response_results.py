@@ -28,7 +28,7 @@ SENSORS_JUDGED = 3
 """Sensors that page one judges, at most: the loudest ones."""
 OF_BOX_RESPONSE = "W-PULL", "W-TAIL", "W-CROSS", "W-STEPS", "W-RIGID"
 """Codes of the findings that concern levels and forces at all speeds of a response."""
-LEVEL_CHANGE_TOLD = 0.5
+_CHANGE = 0.5
 """Change of a level by a longer excitation that is told [dB]."""
 _FORCE_CHANGE = 0.05
 """Relative change of the largest mesh force by a longer excitation that is told."""
@@ -383,7 +383,7 @@ def _level_excitation(data: xr.Dataset) -> Iterator[Finding]:
         return
     change = np.nan_to_num(data["level_change"].values, posinf=0.0, neginf=0.0)
     at, sensor = np.unravel_index(int(np.abs(change).argmax()), change.shape)
-    if abs(change[at, sensor]) > LEVEL_CHANGE_TOLD:
+    if abs(change[at, sensor]) > _CHANGE:
         key, remedy = _end_of_excitation(data)
         text = (
             f"excitation to {_compared_to(data)} in place of {_reach(data)} changes the level of "

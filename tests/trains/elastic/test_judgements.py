@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 import xarray as xr
 
+from femgear.findings import DOUBT, Finding
 from femgear.stages.judgements import QUIET
 from femgear.trains.elastic.judgements import set_with_ring_judgements
 from femgear.trains.reading import read_case, with_values
@@ -66,8 +67,32 @@ def judged(results):
 def test_the_main_line_is_that_of_the_acceleration_with_its_mode(results):
     noise = judged(results)
     assert "order 216 (mesh harmonic 2, 2,160 Hz, mode 2: ring) makes 80% of the power" in noise.sentence
-    assert noise.sentence.endswith("Loudest of the run-up: 9 m/s² at 4,000 rpm")
-    assert noise.answer == "3.16 m/s² at 3,000 rpm"
+    assert noise.sentence.endswith("Loudest of the run-up: 9 m/s² at 4000 rpm, the end of its range")
+    assert noise.answer == "3.162 m/s² at 3,000 rpm"
+
+
+def test_levels_that_a_longer_excitation_raises_are_bounds_and_do_not_hold_their_limit(results):
+    results.case = with_values(results.case, {"housing.level_limit": "10 m/s^2"})
+    results.runup["distance"].values[1] = 12.0
+    assert judged(results).state == "good"
+    results.stages += ("dynamics",)
+    steady = (("speed", "mesh", "harmonic"), [[[100.0, 1.0], [100.0, 1.0]]])
+    calm = {name: ("speed", [True]) for name in ("converged", "stable")}
+    forces = {"mesh_force_real": steady, "mesh_force_imag": (steady[0], np.zeros((1, 2, 2)))}
+    results.dynamics = xr.Dataset({"level_change": ("speed", [12.0]), **calm, **forces}, {"speed": [3000.0]})
+    results.findings = (Finding("W-EXCITATION", "", "the level rises", severity=DOUBT, stage="dynamics"),)
+    noise = judged(results)
+    assert noise.state == "bad" and noise.answer == "> 3 m/s² at 3,000 rpm"
+    assert noise.limit.startswith("2.0 dB over the limit at the sensor with a longer excitation, 3,000 rpm")
+    results.dynamics["level_change"].values[0] = 2.0
+    noise = judged(results)
+    assert noise.state == "look" and noise.limit.endswith(
+        "below the limit at the sensor, 4,000 rpm; doubt: W-EXCITATION"
+    )
+    results.dynamics["level_change"].values[0] = -2.0
+    noise = judged(results)
+    assert noise.state == "look" and noise.answer == "3.162† m/s² at 3,000 rpm"
+    assert noise.limit.endswith("doubt: † W-EXCITATION")
 
 
 def test_a_resonance_that_makes_the_level_deserves_a_look(results):
