@@ -1,31 +1,38 @@
-"""Rows of the validation of faulty teeth: cracks by energy and by one grid, characteristic frequencies."""
+"""Rows of the validation of faulty teeth: cracks by energy and one grid, none at all, characteristic frequencies."""
 
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
 from scipy.sparse import block_diag, coo_array, csc_array, csr_array
 
-from femgear.contact.bodies import Sector, flank_load_columns, flank_stations, make_sectors
+from femgear.contact.assembly import contact_candidates
+from femgear.contact.batch import solve_with_cracks
+from femgear.contact.bodies import Bodies, Sector, flank_load_columns, flank_stations, make_bodies, make_sectors
 from femgear.contact.cracked_flanks import (
     both_flank_loads,
     crack_stiffness,
     cracked_flanks,
     cracked_grids,
+    flanks_of_grids,
 )
+from femgear.contact.windows import first_windows, mesh_windows
 from femgear.fe.compliance import boundary_nodes, node_dofs, symmetric_factor
-from femgear.fe.cracks import SplitGrid, WholeSchur, condense_whole, cracked_ring
+from femgear.fe.cracks import SplitGrid, WholeSchur, condense_whole, cracked_ring, split_grid
 from femgear.fe.elasticity import Material
 from femgear.fe.grid import Grid, copy_nodes, shape_functions
+from femgear.gears.cracked_tooth import BESIDE, SECTION
+from femgear.gears.deviations import no_deviations
 from femgear.gears.faults import LEFT, Crack
 from femgear.gears.gear import Gear
 from femgear.gears.kinematics import speeds
 from femgear.gears.planetary import close_set, equal_planet_angles
 from femgear.stages.tooth_faults import fault_frequencies
 from validation.planetary import reference_set
-from validation.rows import Row, at_most, printed, within
+from validation.rows import Row, at_most, counted, printed, within
 
 STEEL = Material(206e9, 0.3, 7850.0)
 ANGLE, DEPTHS, ELEMENTS = math.radians(70.0), (1.0e-3, 1.5e-3), 12
@@ -84,6 +91,51 @@ def update_identity() -> tuple[Row, ...]:
         text = f"{gear.name}, crack of 1.2 mm: all flanks, update - whole matrix, over the largest compliance"
         rows.append(at_most("crack, identity", "block-cyclic matrix of all cuts, solved directly", text, 1e-12, missed))
     return tuple(rows)
+
+
+def no_crack() -> tuple[Row, ...]:
+    """What a grid that is made for a crack, and parts at no node, changes in compliance and contact: not one bit."""
+    return *no_crack_of(0), *no_crack_of(1)
+
+
+def no_crack_of(number: int) -> tuple[Row, ...]:
+    """Rows of `no_crack` of one gear."""
+    gears, source = reference_set(), "the healthy gear"
+    gear, crack, sectors = gears.gears[number], crack_of(1.2e-3, number), make_sectors(gears, STEEL, flank_elements=4)
+    whole, _ = cracked_grids(gear, crack, flank_elements=4)
+    part_nowhere = split_grid(whole, SECTION, 1, BESIDE[0])
+    flanks = flanks_of_grids(sectors.gears[number], STEEL, crack.form, whole, part_nowhere)
+    healthy = make_bodies(sectors, STEEL)
+    unparted = healthy.with_gear(number, replace(healthy.gears[number], cracks=(flanks,)))
+    states = _contact(healthy, ()), _contact(unparted, (crack,))
+    differing = sum(int((a != b).sum()) for a, b in zip(*states, strict=True))
+    total = sum(part.size for part in states[0])
+    words = f"{gear.name}, grid that parts nowhere"
+    return (
+        at_most(
+            "crack, none",
+            source,
+            f"{words}: change of the compliance between all flanks [m/N]",
+            0.0,
+            np.abs(flanks.ring.core).max(),
+        ),
+        counted("crack, none", source, f"{words}, contact: numbers that differ, of {total}", 0, differing),
+    )
+
+
+def _contact(bodies: Bodies, faults: tuple[Crack, ...]) -> tuple[np.ndarray, ...]:
+    """Compliance between all windows, loads, gaps and motions of the reference set at four positions under 100 N m."""
+    gears, torque = reference_set(), 100.0
+    share, nearest = first_windows(gears, bodies, torque)
+    deviations = replace(no_deviations(gears), faults=faults)
+    setup = mesh_windows(
+        gears, bodies, share=share, nearest=nearest, positions=np.arange(4) + np.arange(4) / 4, deviations=deviations
+    )
+    candidates = contact_candidates(setup, bodies, np.arange(4))
+    load = np.zeros(candidates.approach.shape[1])
+    load[setup.driver] = torque / gears.sun.base_radius
+    candidates, state = solve_with_cracks(candidates, load)
+    return candidates.images, state.loads, state.gaps, state.motions
 
 
 def one_grid() -> tuple[Row, ...]:

@@ -82,8 +82,30 @@ def cracked_flanks(
     cache : path, optional
         Folder of generated grids.
     """
+    whole, split = cracked_grids(sector.gear, crack, flank_elements=flank_elements, cache=cache)
+    return flanks_of_grids(sector, material, crack.form, whole, split, teeth=teeth, support=support)
+
+
+def flanks_of_grids(
+    sector: Sector,
+    material: Material,
+    form: tuple[float | None, float, float],
+    whole: Grid,
+    split: SplitGrid,
+    *,
+    teeth: tuple[float, float] | None = None,
+    support: Support | None = None,
+) -> CrackedFlanks:
+    """Compute what the split of a grid changes, as `cracked_flanks`; one that parts nowhere changes nothing.
+
+    Parameters
+    ----------
+    form : tuple
+        Start, angle and depth of the crack, by which it is known.
+    whole, split : Grid, SplitGrid
+        One grid without the crack and with it.
+    """
     gear = sector.gear
-    whole, split = cracked_grids(gear, crack, flank_elements=flank_elements, cache=cache)
     matrices = [crack_stiffness(grid, gear, material, teeth) for grid in (whole, split.grid)]
     healthy, held = sector.stiffness, None if support else "rim"
     if support is not None:
@@ -101,7 +123,7 @@ def cracked_flanks(
             opening[2 * nodes + axis, np.arange(len(nodes))] = sign * split.normals[:, axis]
     before = condense_whole(whole, matrices[0], of_flanks[0], held=held)
     after = condense_whole(split.grid, matrices[1], np.hstack([of_flanks[1], opening]), held=held)
-    return CrackedFlanks(crack.form, stations.roll, cracked_ring(mirrored, before, after, gear.teeth), split)
+    return CrackedFlanks(form, stations.roll, cracked_ring(mirrored, before, after, gear.teeth), split)
 
 
 def cracked_grids(

@@ -46,11 +46,12 @@ def split_grid(grid: Grid, curve: str, points: int, region: str) -> SplitGrid:
     curve : str
         Boundary of the grid that begins with the crack, mouth first.
     points : int
-        Number of nodes of the crack, with the tip.
+        Number of nodes of the crack, with the tip; one where nothing parts.
     region : str
         Elements on one side of the curve, which get nodes of their own.
     """
-    nodes = ordered_nodes(grid, curve)[:points]
+    line = ordered_nodes(grid, curve)
+    nodes = line[:points]
     parted, tip = nodes[:-1], int(nodes[-1])
     number = np.arange(grid.n_nodes)
     number[parted] = grid.n_nodes + np.arange(len(parted))
@@ -66,7 +67,7 @@ def split_grid(grid: Grid, curve: str, points: int, region: str) -> SplitGrid:
             beyond = np.array([all(number[node] in of_region for node in row) for row in rows])
             edges[name] = np.where(touched & beyond[:, None], number[rows], rows)
     split = Grid(np.vstack([grid.points, grid.points[parted]]), triangles, edges, dict(grid.regions))
-    along = grid.points[tip] - grid.points[nodes[0]]
+    along = grid.points[line[max(points - 1, 2)]] - grid.points[line[0]]
     normal = np.array([-along[1], along[0]]) / np.linalg.norm(along)
     middle = grid.points[np.unique(grid.triangles[grid.regions[region]])].mean(axis=0)
     normal = normal if (middle - grid.points[tip]) @ normal > 0 else -normal
@@ -222,11 +223,13 @@ def cracked_ring(healthy: WholeSchur, whole: WholeSchur, cracked: WholeSchur, co
     change = cracked.stiffness - whole.stiffness
     eased = np.linalg.solve(np.eye(m) + H @ change, np.eye(m))
     less = _symmetric(change @ eased)
-    cut = healthy.load_cut + (cracked.load_cut[:, :L] - whole.load_cut)
-    opening, yielding = cracked.load_cut[:, L:], eased @ H
-    flank = cracked.compliance[:L, :L] - whole.compliance
-    flank = flank + cut.T @ yielding @ cut - healthy.load_cut.T @ H @ healthy.load_cut
-    across = cut.T @ eased - healthy.load_cut.T
+    # all by differences, which are zero to the last bit where nothing is split
+    moved = cracked.load_cut[:, :L] - whole.load_cut
+    cut = healthy.load_cut + moved
+    opening, yielding, across_cut = cracked.load_cut[:, L:], eased @ H, H @ cut
+    flank = cracked.compliance[:L, :L] - whole.compliance - across_cut.T @ less @ across_cut
+    flank = flank + moved.T @ across_cut + healthy.load_cut.T @ H @ moved
+    across = moved.T - across_cut.T @ less
     basis = np.zeros((count, L, m + L))
     basis[1:, :, :m], basis[0, :, m:] = of_loads[1:], np.eye(L)
     core = np.block([[-less, across.T], [across, _symmetric(flank)]])

@@ -16,6 +16,7 @@ from femgear.contact.windows import first_windows, mesh_windows
 from femgear.fe.elasticity import Material
 from femgear.gears.deviations import no_deviations
 from femgear.gears.faults import LEFT, RIGHT, Crack
+from validation import faults
 from validation.planetary import reference_set
 
 STEEL = Material(206e9, 0.3, 7850.0)
@@ -50,6 +51,11 @@ def whole(gears, bodies):
 @pytest.fixture(scope="module")
 def opened(gears, bodies):
     return walk(gears, bodies, CRACK)
+
+
+def test_a_grid_that_parts_nowhere_changes_not_one_bit():
+    """Compliance of all flanks, and loads, gaps and motions of the contact, beside those of the healthy gear."""
+    assert [row.ours for row in faults.no_crack_of(0)] == [0.0, 0]
 
 
 def test_a_cracked_tooth_softens_its_mesh_where_it_carries_and_no_other(opened, whole):

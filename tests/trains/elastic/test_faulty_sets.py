@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from femgear.run import solve
-from femgear.trains.reading import parse_case
+from femgear.trains.reading import parse_case, with_values
 
 SET = """
 format = 1
@@ -22,6 +22,7 @@ ring = {{ teeth = {ring}, outer_radius = "{outer} mm", {foundation} }}
 housing = {{ sensor_angle = "10 deg"{bolts} }}
 """
 WORN = ', fault = [{{ kind = "wear", tooth = 2, flank = "{flank}", depth = "6 um" }}]'
+NONE = {"of_sun": "", "of_planet": ""}
 FOUNDATION = 'foundation_radial = "1e10 N/m^3", foundation_tangential = "1e10 N/m^3"'
 BOLT = '{ angle = "20 deg", radial_stiffness = "2e8 N/m", tangential_stiffness = "1e8 N/m" }'
 
@@ -75,3 +76,18 @@ def test_planets_at_unequal_angles_are_heard_at_every_turn_of_the_carrier():
     order, lines = lines_of((18, 18, 54), 3, "sun", angles='"0 deg", "120 deg", "245 deg"')
     assert lines[np.abs(order - np.rint(order)) > 1e-6].max(initial=0.0) < 1e-6
     assert np.gcd.reduce(np.rint(order[lines > 1e-5]).astype(int)) == 1
+
+
+@pytest.mark.slow
+def test_a_crack_without_depth_and_a_list_without_faults_change_not_one_bit():
+    text = SET.format(
+        sun=18, planet=18, ring=54, planets=3, angles="", outer=62, foundation=FOUNDATION, bolts="", **NONE
+    )
+    whole = parse_case(text, name="set")
+    crack = {"kind": "crack", "tooth": 2, "flank": "left", "depth": "0 mm"}
+    healthy, *others = (
+        solve(with_values(whole, change), only="static")["static"].dataset()
+        for change in ({}, {"sun.fault": []}, {"sun.fault": [crack]})
+    )
+    for data in others:
+        assert data.identical(healthy)
