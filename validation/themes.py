@@ -360,7 +360,7 @@ THEMES = (
         "faults",
         "Faulty teeth",
         "Reference set, cracks at 70° to the centre line of their tooth, their faces open. "
-        "Compared with: the whole matrix of all cuts; one grid of all teeth; the healthy gear, where nothing parts; the "
+        "Compared with: the whole matrix of all cuts; one grid of all teeth; the healthy gear where nothing parts; the "
         "energy release rate by J in two domains; published frequencies of a set 17/37/91; gates: 1e-12; 1 %; every "
         "bit; 2 %; printed digits.",
         (faults.frequencies, faults.energy_release),
