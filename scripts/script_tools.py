@@ -8,8 +8,8 @@ from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from femgear.cli import Progress as Progress
-from femgear.cli import call
+from femgear.commands.process import call
+from femgear.commands.terminal import Progress as Progress
 from femgear.errors import CaseError, printable
 from femgear.storage.files import own_files
 from femgear.storage.files import write_csv as write_csv

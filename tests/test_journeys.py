@@ -17,6 +17,7 @@ from femgear import cli, findings
 from femgear.case.flank_sections import ModificationSection
 from femgear.case.sections import DynamicsSection, HousingSection, RunupSection, StaticSection
 from femgear.case.teeth import flank_form
+from femgear.commands import program, terminal
 from femgear.gears.gear import Gear
 from femgear.gears.modifications import LeadModification, Modification, lead_deviation
 from femgear.trains import registry
@@ -113,6 +114,30 @@ def test_a_question_of_page_one_is_one_judgement(run, capsys):
     assert cli.main(["report", str(folder), "--json"]) == 0
     (judgement,) = json.loads(capsys.readouterr().out)["judgements"]
     assert judgement["question"] == "Does it swing fast?" and judgement["state"] == "good"
+
+
+def test_a_command_is_one_function(capsys):
+    """Options and help follow from its signature and docstring, refusals from what it raises."""
+
+    @program.app.command
+    def weigh(case: Path, /, *, density: program.Whole = 7800) -> int:
+        """Print the weight of a case.
+
+        Parameters
+        ----------
+        density
+            Of the material in kg/m^3.
+        """
+        terminal.say(f"{case} of {density} kg/m^3")
+        return 0
+
+    try:
+        assert cli.main(["weigh", "--help"]) == 0 and "Of the material in kg/m^3." in capsys.readouterr().out
+        assert cli.main(["weigh", "a.toml", "--density", "2700"]) == 0
+        assert capsys.readouterr().out == "a.toml of 2700 kg/m^3\n"
+        assert cli.main(["weigh", "a.toml", "--density", "2.7"]) == 2 and "no whole number" in capsys.readouterr().err
+    finally:
+        del program.app["weigh"]
 
 
 def test_a_modification_of_flanks_is_one_class_and_one_line_of_the_section(monkeypatch):

@@ -28,6 +28,7 @@ LAYERS = (
     ("rigs", "causes"),
     ("assistant",),
     ("app",),
+    ("commands",),
     ("cli",),
     ("__main__",),
 )
@@ -176,8 +177,8 @@ def test_small_modules_are_few():
         of_trains = path.parent.parent.name == "trains" and parts[path.name] > 2
         if path.stem != "__init__" and lines < 100 and len(importers[name]) <= 1 and not of_trains:
             small.append(place(path))
-    # the worker is a process of its own: a signal or a crash of Gmsh ends it alone; former names go with a release
-    assert small == ["__main__.py", "fe/_gmsh_worker.py"]
+    # where the program begins; a process of its own: a signal or a crash of Gmsh ends it alone
+    assert small == ["__main__.py", "cli.py", "fe/_gmsh_worker.py"]
 
 
 def test_every_module_has_the_test_file_of_its_name():
@@ -221,7 +222,7 @@ def test_heavy_libraries_are_imported_late():
 def test_a_run_loads_xarray_without_dask_and_pint():
     """Which come when somebody asks for them; xarray reads and computes as before."""
     code = (
-        "import sys\nfrom femgear import cli\ncli._load_xarray()\ncli._load_xarray()\nimport xarray as xr\n"
+        "import sys\nfrom femgear.commands.run import load_xarray\nload_xarray()\nload_xarray()\nimport xarray as xr\n"
         "data = xr.Dataset({'a': (('t', 'u'), [[1.0, 2.0]])}, coords={'t': [1], 'u': ['v', 'w']})\n"
         "assert data.isel(u=1)['a'].item() == data['a'].max() == 2.0\n"
         "assert not {'dask', 'pint'} & sys.modules.keys()\nimport dask.base, pint\n"
@@ -255,7 +256,7 @@ def test_no_function_is_longer_than_70_lines():
 
 FOREIGN = {
     "case/text.py": "where a TOML file is wrong, the library tells in words alone",
-    "cli.py": "so does Python, of a thread that cannot be started",
+    "commands/process.py": "so does Python, of a thread that cannot be started",
 }
 """Modules that read messages of others, for want of anything else."""
 

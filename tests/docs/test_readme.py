@@ -98,19 +98,19 @@ def test_docstrings_name_what_exists():
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))
 def test_pages_name_commands_that_exist(page):
-    from femgear.cli import app
+    from femgear.cli import program
 
     text = page.read_text(encoding="utf-8")
     fenced = re.findall(r"^```.*?^```", text, flags=re.MULTILINE | re.DOTALL)
     named = re.findall(r"`femgear ([a-z]+)", text)
     named += re.findall(r"^(?:\S+/)?femgear ([a-z]+)", "\n".join(fenced), flags=re.MULTILINE)
-    assert set(named) <= set(app)
+    assert set(named) <= set(program.app)
 
 
 def test_command_table_names_every_command_and_script():
-    from femgear.cli import app
+    from femgear.cli import program
 
-    commands = {name for name in app if not name.startswith("-")}
+    commands = {name for name in program.app if not name.startswith("-")}
     assert commands >= {"check", "run", "report", "sweep", "schema"}
     assert commands <= set(re.findall(r"`femgear (\w+)", COMMANDS))
     assert "| `python validation " in COMMANDS

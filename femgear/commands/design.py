@@ -1,0 +1,194 @@
+"""Commands that write cases: from a few numbers, for a ratio, as a gearbox, with a casing."""
+
+from __future__ import annotations
+
+import shlex
+from dataclasses import dataclass
+from itertools import takewhile
+from pathlib import Path
+from typing import Annotated, Any
+
+from cyclopts import Parameter
+
+from femgear.commands.files import write_case_file
+from femgear.commands.program import Quantity, Whole, app, whole_number
+from femgear.commands.terminal import Progress, print_blocks, print_findings, say
+from femgear.errors import CaseError
+from femgear.study.teeth_request import TeethStrength, WantedTeeth
+
+
+@Parameter(name="*")
+@dataclass(frozen=True)
+class ToothOptions:
+    """What is known of the teeth.
+
+    Parameters
+    ----------
+    teeth
+        Of sun, planet and ring, or of both gears; of planets of other kinds in the order of docs/planets.md.
+    shifts
+        Profile shifts of sun and planet, perhaps of the ring (positive outwards), or of both gears. Default:
+        none where the teeth close without, else shared by equal sliding.
+    centre_distance
+        Default: that at which the shifts close the gears.
+    helix
+        Helix angle of planetary sets, pairs, gearboxes and helical cases. Default: none, of helical ones 20 deg.
+    addendum
+        Of the basic rack, in modules. Default: 1, or what leaves less to warn of.
+    """
+
+    teeth: Annotated[tuple[str, ...], Parameter(consume_multiple=True, negative="")] = ()
+    shifts: Annotated[tuple[float, ...], Parameter(consume_multiple=True, negative="")] = ()
+    centre_distance: Quantity | None = None
+    helix: Quantity | None = None
+    addendum: float | None = None
+
+
+@app.command
+def new(
+    kind: str,
+    /,
+    *,
+    output: Annotated[Path | None, Parameter(name=("--output", "-o"))] = None,
+    module: Quantity | None = None,
+    torque: Quantity | None = None,
+    speed: Quantity | None = None,
+    planets: Whole | None = None,
+    face_width: Quantity | None = None,
+    form: ToothOptions | None = None,
+    force: Annotated[bool, Parameter(negative="")] = False,
+) -> int:
+    """Write a commented case from a few numbers; masses, inertias and stiffnesses are estimated.
+
+    Parameters
+    ----------
+    kind
+        planetary, pair, planar, helical, drivetrain, gearbox; of other planets stepped, double, ravigneaux, wolfrom.
+    output
+        Case file to write. Default: KIND.toml.
+    module
+        Of helical teeth the normal one. Default: 2 mm.
+    torque, speed
+        Of sun or pinion. Default: the torque of a K factor of 1 N/mm^2, 1000 rpm.
+    planets
+        Default: as many as equal spacing allows, three if it can be.
+    face_width
+        Default: twelve modules.
+    force
+        Replace the file.
+    """
+    from femgear.trains.drafts import ToothForm, new_case
+
+    form = form or ToothOptions()
+    count = tuple(whole_number(text_of_count, "--teeth") for text_of_count in form.teeth)
+    numbers: dict[str, Any] = {"teeth": count, "module": module, "torque": torque, "speed": speed}
+    teeth_as = ToothForm(form.shifts, form.centre_distance, form.helix, form.addendum)
+    text = new_case(kind, **numbers, planets=planets, face_width=face_width, form=teeth_as)
+    output = output or Path(f"{kind}.toml")
+    write_case_file(text, output, force=force)
+    for line in takewhile(lambda line_there: line_there.startswith("#"), text.splitlines()):
+        say(f" {line[1:]}")
+    say(f"next:    femgear run {shlex.quote(str(output))}")
+    return 0
+
+
+@app.command
+def teeth(
+    *,
+    ratio: float,
+    output: Annotated[Path, Parameter(name=("--output", "-o"))],
+    wanted: Annotated[WantedTeeth | None, Parameter(name="*", negative="")] = None,
+    strength: Annotated[TeethStrength | None, Parameter(name="*")] = None,
+) -> int:
+    """Find tooth numbers for a ratio: all that assemble, by size, with phasing, hunting teeth and transmission error.
+
+    Parameters
+    ----------
+    ratio
+        Speed of the driving over that of the driven member: of gear 1 over gear 2, of the sun over the carrier.
+    output
+        Folder of teeth.csv, teeth.png and the case files of the best.
+    """
+    from femgear.run import grid_cache
+    from femgear.study.teeth import teeth_into
+
+    request = wanted or WantedTeeth(), strength or TeethStrength()
+    with Progress() as progress:
+        blocks, names = teeth_into(output, ratio, *request, cache=grid_cache(), progress=progress)
+    print_blocks(blocks)
+    say(f"files in {output}: {', '.join(names)}")
+    return 0
+
+
+@app.command
+def gearbox(
+    case: Path,
+    /,
+    *,
+    output: Annotated[Path | None, Parameter(name=("--output", "-o"))] = None,
+    force: Annotated[bool, Parameter(negative="")] = False,
+) -> int:
+    """Write a planetary set or a pair as a gearbox of one stage; say what a gearbox has no place for.
+
+    Its members are bodies on springs. Shafts, rolling bearings, a casing and more stages can be added to the file. A
+    file of a former model (multistage, drivetrain) is written with the entries of today.
+
+    Parameters
+    ----------
+    case
+        TOML case file of a set, with or without the sections planar and helical, of a pair, or of a former model.
+    output
+        Case file to write. Default: NAME_gearbox.toml.
+    force
+        Replace the file.
+    """
+    from femgear.case import text as case_text
+    from femgear.trains.gearbox_of_case import gearbox_of_case
+    from femgear.trains.reading import parse_case, read_case
+
+    written = gearbox_of_case(read_case(case))
+    text = case_text.write(written.tables)
+    parse_case(text)  # what is no gearbox is refused before a file is written
+    print_findings(written.findings)
+    output = output or Path(f"{case.stem}_gearbox.toml")
+    write_case_file(text, output, force=force)
+    say(f"next:    femgear run {shlex.quote(str(output))}")
+    return 0
+
+
+@app.command
+def casing(
+    case: Path,
+    /,
+    *,
+    output: Annotated[Path | None, Parameter(name=("--output", "-o"))] = None,
+    force: Annotated[bool, Parameter(negative="")] = False,
+) -> int:
+    """Give a gearbox a rigid casing on feet, three sensors and a run-up, all estimated, so that a run has its sound.
+
+    Parameters
+    ----------
+    case
+        TOML case file of a gearbox without a casing.
+    output
+        Case file to write, in the folder of the case if that names other files. Default: NAME_in_casing.toml.
+    force
+        Replace the file.
+    """
+    from femgear.case import text as case_text
+    from femgear.trains.reading import parse_case, read_case
+    from femgear.trains.registry import train_of
+
+    read = read_case(case)
+    train = train_of(read)
+    if train.draft_casing is None:
+        limit, remedy = 'model = "gearbox"', f"femgear gearbox {shlex.quote(str(case))} makes one of a set or a pair"
+        raise CaseError(f"{train.words} has no casing of its own", code="E-MODEL", limit=limit, remedy=remedy)
+    tables, findings = train.draft_casing(read)
+    output = output or case.with_name(f"{case.stem}_in_casing.toml")
+    text = f"{case_text.read_text(case).rstrip()}\n\n{tables}"
+    parse_case(text, name=str(output))  # what is no case is refused before a file is written
+    print_findings(findings)
+    write_case_file(text, output, force=force)
+    say(f"next:    femgear run {shlex.quote(str(output))}")
+    return 0

@@ -1,0 +1,277 @@
+"""Commands that check and compute a case, and show or compare results."""
+
+from __future__ import annotations
+
+import contextlib
+import shlex
+import sys
+import textwrap
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+from cyclopts import Parameter
+
+from femgear.commands.files import results_folder
+from femgear.commands.program import app
+from femgear.commands.terminal import Progress, print_blocks, print_briefly, print_data, print_findings, say
+from femgear.errors import CaseError, FemgearError
+
+if TYPE_CHECKING:
+    from femgear.case.text import ReadCase
+
+
+@app.command
+def check(
+    case: Path,
+    /,
+    *,
+    neighbours: Annotated[bool, Parameter(negative="")] = False,
+    only: str | None = None,
+    json: Annotated[bool, Parameter(negative="")] = False,
+) -> int:
+    """Read a case, check its gears, print what they are, and refuse what a run would refuse.
+
+    Parameters
+    ----------
+    case
+        TOML case file.
+    neighbours
+        Print which neighbouring tooth numbers would fit, too.
+    only
+        Refuse only what femgear run --only with this stage would refuse.
+    json
+        Print findings and refusal as data (docs/command_line.md).
+    """
+    from femgear.trains.reading import read_case
+    from femgear.trains.registry import check_case, train_of
+
+    if json:
+        return _check_as_data(case, only)
+    data = read_case(case)
+    print_blocks(block for block in train_of(data).describe_case(data) if neighbours or not block.beside)
+    try:
+        check_case(data, only)
+    except FemgearError:
+        if only is None:
+            sys.stdout.flush()
+            print(_refused_stages(data), file=sys.stderr)
+        raise
+    return 0
+
+
+def _check_as_data(path: Path, only: str | None) -> int:
+    """Print what is said of a case as data; the exit code is that of its refusal."""
+    from femgear.stages.summary_data import check_data
+    from femgear.trains.reading import read_case
+    from femgear.trains.registry import check_case, train_of
+
+    case, refusal = None, None
+    try:
+        case = read_case(path)
+        check_case(case, only)
+    except FemgearError as error:
+        refusal = error
+    print_data(check_data(None if case is None else train_of(case), case, refusal))
+    return 0 if refusal is None else refusal.exit_code
+
+
+def _refused_stages(case: ReadCase) -> str:
+    """Say which stages of a run without ``--only`` cannot represent a case, and which can."""
+    from femgear.trains.registry import check_case, stages_of, train_of
+
+    works = []
+    for stage in train_of(case).stages:
+        with contextlib.suppress(FemgearError):
+            check_case(case, stage.name)
+            works.append(stage.name)
+    refused = ", ".join(stage.name for stage in stages_of(case) if stage.name not in works)
+    others = f"; it takes --only {' or '.join(works)}" if works else ""
+    return f"femgear run without --only refuses this case ({refused}){others}:"
+
+
+@app.command
+def run(
+    case: Path | None = None,
+    /,
+    *,
+    output: Annotated[Path | None, Parameter(name=("--output", "-o"))] = None,
+    only: str | None = None,
+    pictures: bool = True,
+    force: bool = False,
+    verbose: Annotated[bool, Parameter(negative="")] = False,
+    json: Annotated[bool, Parameter(negative="")] = False,
+) -> int:
+    """Compute a case and write results, pictures and report.
+
+    It prints what page one of the report answers and the verdict; of --only STAGE the table of that stage.
+
+    Parameters
+    ----------
+    case
+        TOML case file. Default: the only one in the current folder.
+    output
+        Folder of the results. Default: CASE_results, beside the case.
+    only
+        Compute this stage and what it needs, no further: "static", "stress" (whatever static.stresses says),
+        "life", "losses" or "heat" of teeth, "modes", "dynamics", "housing" or "assumptions"; "branch" or "response"
+        of planar cases; "deflection", "balance", "transient" or "spectrum" of gearboxes; "sweep" or "chaos" of gear
+        pairs.
+    pictures
+        Draw figures, fields and report.
+    force
+        Replace the results that the folder holds, once the new ones are complete.
+    verbose
+        Print the tables of all stages.
+    json
+        Print what decides as data, and nothing else on standard output (docs/command_line.md).
+    """
+    from femgear.run import run_case
+    from femgear.storage.files import resumable
+    from femgear.storage.results import completed_since_now, run_folder
+    from femgear.trains.reading import read_case
+    from femgear.trains.registry import check_case, stage_names, train_of
+
+    if only is not None and only not in (names := stage_names()):
+        raise CaseError(
+            "no train has this stage",
+            code="E-ARGUMENTS",
+            key="--only",
+            value=only,
+            limit=", ".join(names),
+            remedy="femgear run --help",
+        )
+    case = case or _only_case()
+    data = read_case(case)
+    check_case(data, only)  # refuse before the folder is touched
+    output = output or results_folder(case)
+    train = train_of(data)
+    print_findings(train.case_warnings(data))
+    place = run_folder(output, case=data.source, force=force)
+    with resumable(output, completed_since_now(output)):
+        with place as folder, Progress() as progress:
+
+            def tell_numbers(results) -> None:
+                """Print what was found, before anything is drawn."""
+                with progress.aside():
+                    if not json:
+                        if verbose:
+                            print_blocks(train.describe_results(results))
+                        else:
+                            print_briefly(train.describe_briefly(results, only))
+                    print_findings(train.result_warnings(results))
+                    sys.stdout.flush()
+                if pictures:
+                    load_xarray()
+
+            run_case(data, folder, only=only, pictures=pictures, progress=progress, computed=tell_numbers)
+        if json:
+            return _print_run(output)
+        say(f"results: {output}")
+        if pictures:
+            say(f"report:  {output / 'report.html'}")
+        if not verbose:
+            say(f"tables:  femgear report {shlex.quote(str(output))} --verbose")
+    return 0
+
+
+def load_xarray() -> None:
+    """Load xarray, which finds no Dask and no Pint: nothing has their arrays, and to load them takes long."""
+    hidden = set() if "xarray" in sys.modules else {"dask", "pint"} - sys.modules.keys()
+    sys.modules.update(dict.fromkeys(hidden))  # type: ignore[arg-type]
+    try:
+        import xarray as xr
+
+        xr.Dataset({"x": ("x", [0.0])})  # now it asks what kinds of arrays there are, and never again
+    finally:
+        for name in hidden:
+            del sys.modules[name]
+
+
+def _print_run(folder: Path) -> int:
+    """Print what decides about a run as data."""
+    from femgear.stages.summary_data import run_data
+    from femgear.trains.reading import open_results
+    from femgear.trains.registry import train_of
+
+    results = open_results(folder)
+    print_data(run_data(train_of(results.case), results))
+    return 0
+
+
+def _only_case() -> Path:
+    """Find the one case file of the current folder."""
+    files = sorted(path for path in Path().glob("*.toml") if path.name != "pyproject.toml")
+    if len(files) == 1:
+        return files[0]
+    here = ", ".join(map(str, files or sorted(Path().iterdir())))
+    raise CaseError(
+        f"no case is named, and the current folder holds {len(files) or 'none'}",
+        code="E-ARGUMENTS",
+        value=textwrap.shorten(here, 200, placeholder=" ...") or "an empty folder",
+        limit="one *.toml",
+        remedy="name one" if files else "femgear new planetary writes one; femgear run --help",
+    )
+
+
+@app.command
+def report(
+    folder: Path,
+    /,
+    *,
+    static: Annotated[bool, Parameter(negative="")] = False,
+    verbose: Annotated[bool, Parameter(negative="")] = False,
+    json: Annotated[bool, Parameter(negative="")] = False,
+) -> int:
+    """Write report.html from the results in a folder.
+
+    Parameters
+    ----------
+    folder
+        Folder that femgear run wrote.
+    static
+        Pictures and no scripts: for paper, and where scripts are not allowed.
+    verbose
+        Print the tables of all stages.
+    json
+        Print what decides as data, and write no page (docs/command_line.md).
+    """
+    from femgear.run import report_again
+    from femgear.trains.reading import open_results
+    from femgear.trains.registry import train_of
+
+    if json:
+        return _print_run(folder)
+    report_again(folder, static=static)
+    if verbose:
+        results = open_results(folder)
+        print_blocks(train_of(results.case).describe_results(results))
+    say(f"report:  {folder / 'report.html'}")
+    return 0
+
+
+@app.command
+def compare(*runs: Path, output: Annotated[Path, Parameter(name=("--output", "-o"))]) -> int:
+    """Compare runs: entries of the cases and numbers that differ, modes of one shape, curves over each other, sounds.
+
+    Parameters
+    ----------
+    runs
+        Two or more folders that femgear run wrote, of cases of one kind; changes are those against the first.
+    output
+        Folder of the page compare.html.
+    """
+    from femgear.report.compare import compare_page, compared
+    from femgear.storage.files import own_files, write_text
+    from femgear.trains.reading import open_results
+    from femgear.trains.registry import same_train
+
+    if len(runs) < 2:
+        count = f"{len(runs)} runs"
+        raise CaseError("there is nothing to compare", code="E-ARGUMENTS", value=count, limit="two or more")
+    own_files(output, ["compare.html"])
+    opened = [open_results(folder) for folder in runs]
+    train = same_train(opened)
+    print_blocks(compared(train, *opened))
+    write_text(compare_page(train, *opened), output / "compare.html")
+    say(f"page: {output / 'compare.html'}")
+    return 0

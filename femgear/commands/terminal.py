@@ -1,0 +1,177 @@
+"""What commands show on a terminal: progress, tables, lines, findings and data."""
+
+from __future__ import annotations
+
+import contextlib
+import sys
+import textwrap
+import threading
+import time
+from collections.abc import Iterator, Sequence
+
+from femgear.errors import printable
+
+SILENCE = 10.0
+"""Longest time without a line where standard error is a file or a pipe [s]."""
+_BRIEF, _LEAST_ROWS = 40, 1
+"""Lines that a run prints of its tables, and rows that are left of the longest one."""
+
+
+class Progress:
+    """Bars on the terminal, or lines where standard error is a file or a pipe; called by the stages."""
+
+    def __enter__(self):
+        from rich.console import Console
+
+        self._console = Console(stderr=True, markup=False, highlight=False)
+        self._done, self._now, self._start = dict[str, tuple[float, float]](), "", time.monotonic()
+        self._ended, self._bars, self._tasks = threading.Event(), None, {}
+        if self._console.is_terminal:
+            self._draw_bars()
+        else:
+            threading.Thread(target=self._tell_time, daemon=True).start()
+        return self
+
+    def __exit__(self, *_):
+        self._ended.set()
+        if self._bars is not None:
+            self._bars.stop()
+
+    def __call__(self, stage: str, done: float = 0.0, total: float = 1.0) -> None:
+        """Say that ``done`` of ``total`` steps of a stage are done."""
+        if stage not in self._done and self._bars is None:
+            self._console.print(stage)
+        self._done[stage], self._now = (done, total), stage
+        if self._bars is not None:
+            if stage not in self._tasks:
+                self._tasks[stage] = self._bars.add_task(stage, total=total)
+            self._bars.update(self._tasks[stage], completed=done, total=total)
+
+    @contextlib.contextmanager
+    def aside(self) -> Iterator[None]:
+        """Leave the terminal to others in this context; the bars of what comes stand below."""
+        if self._bars is not None:
+            self._bars.stop()
+        yield
+        if self._bars is not None:
+            self._draw_bars()
+
+    def _draw_bars(self) -> None:
+        """Begin with new bars."""
+        from rich import progress
+
+        self._tasks = {}
+        self._bars = progress.Progress(
+            progress.TextColumn("{task.description}", markup=False),
+            progress.BarColumn(),
+            progress.TaskProgressColumn(),
+            progress.MofNCompleteColumn(),
+            progress.TimeElapsedColumn(),
+            progress.TimeRemainingColumn(),
+            console=self._console,
+        )
+        self._bars.start()
+
+    def _tell_time(self) -> None:
+        """Print how far the stage has come as often as a reader would begin to wonder."""
+        while not self._ended.wait(SILENCE):
+            done, total = self._done.get(self._now, (0.0, 1.0))
+            share = f", {done:.5g} of {total:.5g}" if total > 1.0 else ""
+            self._console.print(f"{self._now}{share}, {time.monotonic() - self._start:.0f} s")
+
+
+def print_blocks(blocks) -> None:
+    """Print blocks of `femgear.report.page` as tables on standard output."""
+    sys.stdout.write(_as_text(blocks))
+
+
+def print_briefly(blocks) -> None:
+    """Print blocks in `_BRIEF` lines, if that leaves `_LEAST_ROWS` of the longest table, whose last rows go."""
+    from dataclasses import replace
+
+    from femgear.report.tables import merged
+
+    blocks = [replace(block, rows=tuple(merged(block.rows))) for block in blocks]
+    longest = max(range(len(blocks)), key=lambda number: len(blocks[number].rows))
+    whole = blocks[longest]
+    while (text := _as_text(blocks)).count("\n") > _BRIEF and len(blocks[longest].rows) > _LEAST_ROWS:
+        rows = blocks[longest].rows[:-1]
+        more = f"{len(whole.rows) - len(rows)} more by --verbose"
+        blocks[longest] = replace(whole, rows=rows, notes=(more, *whole.notes))
+    sys.stdout.write(text)
+
+
+def _as_text(blocks) -> str:
+    """Write blocks of `femgear.report.page` as tables, as wide as the terminal, or in 120 columns."""
+    from rich import box
+    from rich.console import Console
+    from rich.table import Table
+
+    from femgear.report.tables import merged
+
+    console = Console(markup=False, highlight=False, emoji=False)
+    if not console.is_terminal:
+        console.width = 120
+    with console.capture() as captured:
+        for block in blocks:
+            console.print(f"\n{printable(block.title)}")
+            rows = [[printable(cell) for cell in row] for row in merged(block.rows)]
+            for columns in _fitting(block.header, rows, console.width) if rows else ():
+                table = Table(box=box.SIMPLE_HEAD if block.header else None, show_header=bool(block.header))
+                for index, name, least in columns:
+                    side = "right" if index and block.header else "left"
+                    # numbers stay whole, texts break between words
+                    whole = not any(" " in row[index] for row in rows)
+                    table.add_column(name, justify=side, overflow="fold", no_wrap=whole, min_width=least)
+                for row in rows:
+                    table.add_row(*(row[index] for index, *_ in columns))
+                console.print(table)
+            for note in block.notes:
+                console.print(f"  {printable(note)}")
+    return captured.get()
+
+
+def _fitting(header: Sequence[str], rows: Sequence[Sequence[str]], width: int) -> list[list[tuple[int, str, int]]]:
+    """Split columns so that no number breaks in a width, the first one repeated; places, names, least widths.
+
+    Names break between words where that makes the table narrower.
+    """
+    names = list(header) or [""] * len(rows[0])
+    cells = [max(len(row[i]) for row in rows) for i in range(len(names))]
+    natural = sum(max(len(name), cell) + 3 for name, cell in zip(names, cells))
+    if natural > width:
+        names = [_broken(name, cell) for name, cell in zip(names, cells)]
+    least = [
+        max(map(len, [*name.split("\n"), *(word for row in rows for word in row[i].split())]), default=0)
+        for i, name in enumerate(names)
+    ]
+    parts, used = [[0]], least[0]
+    for i in range(1, len(names)):
+        if used + least[i] + 3 * (len(parts[-1]) + 1) >= width and len(parts[-1]) > 1:
+            parts.append([0])
+            used = least[0]
+        parts[-1].append(i)
+        used += least[i]
+    return [[(i, names[i], least[i]) for i in part] for part in parts]
+
+
+def _broken(name: str, width: int) -> str:
+    """Break a name between words to lines of a width, or of its longest word."""
+    return "\n".join(textwrap.wrap(name, max([width, *map(len, name.split())]), break_on_hyphens=False))
+
+
+def say(text: str) -> None:
+    print(printable(text))
+
+
+def print_data(data: object) -> None:
+    """Print data as JSON on standard output."""
+    import json
+
+    print(json.dumps(data, indent=2, ensure_ascii=False, allow_nan=False))
+
+
+def print_findings(findings) -> None:
+    """Print findings on standard error, a line each."""
+    for finding in findings:
+        print(f"warning: {printable(str(finding))}", file=sys.stderr)

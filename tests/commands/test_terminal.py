@@ -1,0 +1,105 @@
+"""femgear/commands/terminal.py: tables that fit, progress that is never silent."""
+
+import re
+import time
+
+import pytest
+from command_stand_ins import Narrow
+from rich.console import Console
+
+from femgear.commands import terminal
+from femgear.report.tables import Block, merged
+
+
+@pytest.mark.parametrize("width", [60, 80, 120])
+def test_no_number_of_a_table_breaks_in_a_narrow_terminal(width, capsys, monkeypatch):
+    """Names break between words, and what is still too wide goes below with the first column again."""
+    header = "speed [rpm]", *(f"a long name of column {i} [m/s²]" for i in range(9)), "kind"
+    rows = tuple((f"{100 * i}", *(f"{i}.2345{j}" for j in range(9)), "ring, rotational") for i in range(3))
+
+    class Terminal(Console):
+        def __init__(self, **options):
+            super().__init__(width=width, force_terminal=True, **options)
+
+    monkeypatch.setattr("rich.console.Console", Terminal)
+    terminal.print_blocks([Block("Table", header, rows)])
+    text = re.sub("\x1b[^m]*m", "", capsys.readouterr().out)
+    assert max(map(len, text.splitlines())) <= width
+    for cell in (cell for row in rows for cell in row[:-1]):
+        assert re.search(rf"(?<![\d.]){re.escape(cell)}(?![\d.])", text)
+    assert text.count("speed") == {60: 3, 80: 2, 120: 1}[width]
+
+
+def test_equal_rows_that_follow_one_another_are_one(capsys):
+    rows = (
+        *(("sun-planet 1", "4.02"), ("sun-planet 2", "4.02"), ("sun-planet 3", "4.02")),
+        *(("planet 1-ring", "2.7"), ("planet 2-ring", "2.7"), ("planet 3-ring", "2.8")),
+        *(("12", "1"), ("14", "1"), ("250.5", "1"), ("x", "1"), ("x", "1"), ("", "1")),
+    )
+    assert [row[0] for row in merged(rows)] == [
+        "sun-planet 1..3",
+        "planet 1..2-ring",
+        "planet 3-ring",
+        "12",
+        "14",
+        "250.5",
+        "x",
+        "x",
+        "",
+    ]
+    assert len({row[1] for row in merged(rows)}) == 4
+    terminal.print_blocks([Block("Static", ("mesh", "STE [um]"), rows[:3])])
+    out = capsys.readouterr().out
+    assert out.count("4.02") == 1 and "sun-planet 1..3" in out
+
+
+def test_progress_tells_per_cent_count_and_time_left(monkeypatch, capsys):
+    monkeypatch.setattr("rich.console.Console", Narrow)
+    with terminal.Progress() as progress:
+        progress("sound", 0, 40)
+        progress("sound", 10, 40)
+    shown = re.sub("\x1b\\[[^a-zA-Z]*[a-zA-Z]", "", capsys.readouterr().err)
+    last = [line for line in re.split("[\r\n]+", shown) if "sound" in line][-1]
+    assert "25%" in last and "10/40" in last and last.count(":") >= 2 and len(last.rstrip()) <= 80
+
+
+def test_progress_is_one_line_a_stage_in_a_file(capsys):
+    with terminal.Progress() as progress:
+        for done in range(3):
+            progress("pictures", done, 2)
+        progress("sound", 0, 1)
+    assert capsys.readouterr().err.split() == ["pictures", "sound"]
+
+
+def test_progress_is_never_silent_for_long_in_a_file(monkeypatch, capsys):
+    monkeypatch.setattr(terminal, "SILENCE", 0.05)
+    with terminal.Progress() as progress:
+        progress("pictures", 3, 11)
+        time.sleep(0.5)
+    lines = capsys.readouterr().err.splitlines()
+    assert lines[0] == "pictures" and len(lines) > 2
+    assert all(line.startswith("pictures, 3 of 11, ") and line.endswith(" s") for line in lines[1:])
+
+
+def test_a_run_is_told_in_few_lines_of_80_columns(monkeypatch, capsys):
+    """The last rows of the longest table go; a note tells how many, before the other notes."""
+
+    class Narrow(Console):
+        is_terminal = True
+
+        def __init__(self, **options):
+            super().__init__(**options, width=80)
+
+    monkeypatch.setattr("rich.console.Console", Narrow)
+    answers = tuple((f"question {i}", f"a long answer {i * i} " * 6) for i in range(5))
+    numbers = tuple((f"row {i}", f"number {i * i} of a run with its place, " * 3) for i in range(30))
+    blocks = [Block("answers", rows=answers), Block("numbers", rows=numbers, notes=("a note",))]
+    terminal.print_briefly(blocks)
+    printed = capsys.readouterr().out.splitlines()
+    assert len(printed) <= 40 and max(map(len, printed)) <= 80
+    left = sum("row " in line for line in printed)
+    at = next(i for i, line in enumerate(printed) if "more by --verbose" in line)
+    assert 1 < left < 30 and printed[at] == f"  {30 - left} more by --verbose" and "a note" in printed[at + 1]
+    assert "question 4" in "".join(printed)
+    terminal.print_briefly([Block("numbers", rows=numbers[:3])])
+    assert "--verbose" not in capsys.readouterr().out
