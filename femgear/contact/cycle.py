@@ -496,7 +496,7 @@ class _Walk:
             setup, solved = self._solved_at(np.flatnonzero(moved), share, nearest, turned, solved)
         else:
             raise ContactError(
-                "the gears do not come to rest where a tooth is missing",
+                "the gears do not come to rest where a tooth is missing or short",
                 code="E-CONTACT",
                 limit=f"{_MOST_TURNS} solutions",
                 remedy=LESS_TORQUE,

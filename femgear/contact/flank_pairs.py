@@ -30,7 +30,7 @@ from femgear.gears.deviations import (
     profile_separation,
     tooth_separation,
 )
-from femgear.gears.faults import LEFT, RIGHT, fault_form
+from femgear.gears.faults import LEFT, RIGHT, fault_form, flank_limits
 from femgear.gears.gear import Gear
 from femgear.gears.kinematics import orientations, pitch_tooth
 from femgear.gears.pair import GearSet
@@ -77,9 +77,14 @@ class FlankPair:
     @property
     def path(self) -> tuple[float, float]:
         """Ends of the path of contact, measured from the pitch point in the direction of motion [m]."""
-        roll_2 = sorted(self.sign * (self.pitch_roll_2 - r) for r in self.limits_2)
-        start = max(self.limits_1[0] - self.pitch_roll_1, roll_2[0])
-        return start, min(self.limits_1[1] - self.pitch_roll_1, roll_2[1])
+        begin, end = self.path_between(np.array([self.limits_1, self.limits_2]))
+        return float(begin), float(end)
+
+    def path_between(self, limits: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Ends (...) [m] of the path of contact of flanks between roll lengths (2, 2, ...) [m], as of `path`."""
+        roll_2 = np.sort(self.sign * (self.pitch_roll_2 - limits[1]), axis=0)
+        start = np.maximum(limits[0, 0] - self.pitch_roll_1, roll_2[0])
+        return start, np.minimum(limits[0, 1] - self.pitch_roll_1, roll_2[1])
 
     def roll_on(self, gear: int, zeta):
         """Roll length [m] on gear 1 (0) or gear 2 (1) at path coordinates, kept on the path of contact."""
@@ -125,18 +130,20 @@ def separation(pair: FlankPair, zeta, roll_1):
     return gap, length - sign * gap
 
 
-def admissible_arcs(pair: FlankPair, zeta):
+def admissible_arcs(pair: FlankPair, zeta, limits: np.ndarray | None = None):
     """Find the range of arc length on flank 1 whose points and foot points both lie on the flanks.
 
     At path coordinates ``zeta`` [m]; ``low`` and ``high``, of the same shape, are arc lengths from the base
-    circle along flank 1 [m].
+    circle along flank 1 [m]. Flanks that are not whole have ``limits`` (2, 2, ...) of their own: smallest and largest
+    roll length of gear 1 and gear 2 [m].
     """
     zeta = np.asarray(zeta, float)
     rb1 = pair.base_radius_1
-    low = np.full(zeta.shape, pair.limits_1[0] ** 2 / (2 * rb1))
-    high = np.full(zeta.shape, pair.limits_1[1] ** 2 / (2 * rb1))
+    limits_1, limits_2 = (pair.limits_1, pair.limits_2) if limits is None else limits
+    low = np.full(zeta.shape, np.asarray(limits_1[0]) ** 2 / (2 * rb1))
+    high = np.full(zeta.shape, np.asarray(limits_1[1]) ** 2 / (2 * rb1))
     for bound in range(2):
-        arc = _arc_of_foot(pair, zeta, pair.limits_2[bound])
+        arc = _arc_of_foot(pair, zeta, limits_2[bound])
         # along flank 1 the foot point moves down an external flank 2 and up an internal one
         if (bound == 0) == (pair.sign > 0):
             high = np.minimum(high, arc)
@@ -251,22 +258,41 @@ def profile_form(
             lambda roll_1, roll_2: profile_separation(deviations, planetary_set, kind, roll_1, roll_2, back=back)
         )
     if deviations.faults and tooth is not None and turns is not None:
-        faulty = _fault_form(planetary_set, deviations, kind, back, tooth, turns)
+        faulty = fault_form(deviations.faults, planetary_set, kind, *_met(planetary_set, kind, back, tooth, turns))
         forms += [faulty] if faulty else []
     if len(forms) < 2:
         return forms[0] if forms else None
     return lambda roll_1, roll_2: forms[0](roll_1, roll_2) + forms[1](roll_1, roll_2)
 
 
-def _fault_form(planetary_set: GearSet, deviations: SetDeviations, kind: int, back: bool, tooth, turns):
-    """Separation by faults of teeth as `fault_form` has it; arguments as of `profile_form`."""
+def pair_limits(
+    planetary_set: GearSet,
+    deviations: SetDeviations | None,
+    pair: FlankPair,
+    kind: int,
+    back: bool,
+    tooth: np.ndarray,
+    turns: np.ndarray,
+) -> np.ndarray | None:
+    """Find where the flanks of pairs (2, 2, meshes of the kind, P, pairs) end [m]; None where all are whole.
+
+    As of `femgear.gears.faults.flank_limits`, from teeth (2, meshes, pairs) in the first mesh period and the mesh
+    periods passed (P,).
+    """
+    if deviations is None or not deviations.faults:
+        return None
+    whole = np.array([pair.limits_1, pair.limits_2])
+    return flank_limits(deviations.faults, planetary_set, kind, *_met(planetary_set, kind, back, tooth, turns), whole)
+
+
+def _met(planetary_set: GearSet, kind: int, back: bool, tooth, turns) -> tuple[np.ndarray, np.ndarray]:
+    """Teeth (2, meshes of the kind, P, pairs) that meet, and the flanks (2, meshes of the kind) with which."""
     rows, sides = np.flatnonzero(planetary_set.mesh_kind == kind), np.zeros((2, len(planetary_set.meshes)), int)
     for _, acting in acting_flanks(planetary_set):
         for mesh, place, side in acting:
             sides[place, mesh] = RIGHT - side if back else side
     steps = np.array([tooth_steps(planetary_set, rows, place) for place in (0, 1)])
-    numbers = tooth[:, rows, None] + steps[:, :, None, None] * turns[:, None]
-    return fault_form(deviations.faults, planetary_set, kind, numbers, sides[:, rows])
+    return tooth[:, rows, None] + steps[:, :, None, None] * turns[:, None], sides[:, rows]
 
 
 def pair_separations(

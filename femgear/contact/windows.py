@@ -21,6 +21,7 @@ from femgear.contact.flank_pairs import (
     admissible_arcs,
     flank_side,
     mesh_pairs,
+    pair_limits,
     pair_separations,
     profile_form,
     separation,
@@ -250,6 +251,7 @@ def mesh_windows(  # noqa: PLR0913
                 "line_of_action": contact == "line_of_action",
                 "form": profile_form(planetary_set, deviations, kind, direction < 0, tooth, turns),
                 "whole": profile_form(planetary_set, whole, kind, direction < 0, tooth, turns),
+                "limits": pair_limits(planetary_set, deviations, contact_pair, kind, direction < 0, tooth, turns),
                 "moved": 0.0 if moved is None else moved[rows],
             }
             windows_of_meshes.append(windows(contact_pair, zeta[rows], shift=shift[rows], **options))
@@ -371,6 +373,7 @@ def windows(  # noqa: PLR0913
     form: Callable | None = None,
     whole: Callable | None = None,
     shift: float | np.ndarray = 0.0,
+    limits: np.ndarray | None = None,
     moved: float | np.ndarray = 0.0,
 ) -> Windows:
     """Place pressure cells around the point of smallest separation of every tooth pair.
@@ -394,12 +397,14 @@ def windows(  # noqa: PLR0913
         The same of flanks of which no part is missing: windows lie around the place where these come nearest.
     shift : float or (...) array, broadcast with `zeta`
         Separation that errors of position add to a whole pair [m].
+    limits : (2, 2, ...) array, optional
+        Smallest and largest roll length of the flanks of gear 1 and gear 2 [m] where not all are whole.
     moved : float or array, broadcast with `zeta`
         Path coordinates at which flanks stand beyond those that count the pairs [m].
     """
     counted = np.asarray(zeta, float)
     zeta = counted + moved
-    low, high = admissible_arcs(pair, zeta)
+    low, high = admissible_arcs(pair, zeta, limits)
     nominal = np.maximum(pair.pitch_roll_1 + zeta, 0.0) ** 2 / (2 * pair.base_radius_1)
     centre = np.clip(nominal, low, np.maximum(low, high))
     if whole is not None:
@@ -414,7 +419,7 @@ def windows(  # noqa: PLR0913
     node_arc = np.minimum(start[..., None] + WINDOW_NODES * width, np.maximum(high, low + width)[..., None])
     roll_1 = np.sqrt(2 * pair.base_radius_1 * node_arc)
     roll_2 = separation(pair, zeta[..., None], roll_1)[1]
-    begin, end = pair.path
+    begin, end = pair.path if limits is None else pair.path_between(limits)
     smallest = gap.min(axis=-1)
     on_path = (zeta >= begin) & (zeta <= end)
     with np.errstate(invalid="ignore"):  # of pairs whose teeth are missing

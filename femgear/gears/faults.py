@@ -1,15 +1,15 @@
 """Faults of a tooth: missing, broken off at its tip, pitted, worn, or cracked at its root.
 
-All but cracks take material off a flank, and so add to the separation of the flanks, over the roll length of the gear
-that has them. Teeth are numbered as in `femgear.gears.deviations`; the left flank of a tooth is the one on its
-counter-clockwise side.
+A broken tip ends a flank, a crack makes its tooth softer. All others take material off a flank, and so add to the
+separation of the flanks, over the roll length of the gear that has them. Teeth are numbered as in
+`femgear.gears.deviations`; the left flank of a tooth is the one on its counter-clockwise side.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, ClassVar
+from typing import TYPE_CHECKING, ClassVar, TypeVar
 
 import numpy as np
 
@@ -33,7 +33,7 @@ class ToothFault:
     flank : int or None
         `LEFT` or `RIGHT`; None stands for both.
     separates : bool
-        Whether it takes material off the flank; a crack does not.
+        Whether it makes the flank stand back; a crack does not, and where a tip is broken off there is no flank.
     """
 
     gear: int
@@ -54,6 +54,9 @@ class ToothFault:
         return replace(self, tooth=tooth, flank=flank, copy=copy)
 
 
+Fault = TypeVar("Fault", bound=ToothFault)
+
+
 @dataclass(frozen=True)
 class MissingTooth(ToothFault):
     """A tooth that is broken off at its root: no point of its flanks can touch."""
@@ -72,14 +75,14 @@ class BrokenTip(ToothFault):
         Roll length at which the flank ends [m].
     internal : bool
         Whether the tip is at the smaller roll lengths.
+    separates : bool
+        False: the flank ends.
     """
 
     roll: float
     internal: bool
 
-    def removed(self, roll: np.ndarray) -> np.ndarray:
-        gone = roll < self.roll if self.internal else roll > self.roll
-        return np.where(gone, np.inf, 0.0)
+    separates: ClassVar[bool] = False
 
 
 @dataclass(frozen=True)
@@ -150,15 +153,12 @@ class Crack(ToothFault):
 
 
 def missing_length(fault: ToothFault, gears: GearSet) -> float:
-    """Find the length of the part of a flank that is missing [m], along the flank; zero of others."""
+    """Find the length of the part amid a flank that stands back [m], along the flank; zero of others than pits."""
+    if not isinstance(fault, Spall):
+        return 0.0
     gear = gears.gears[fault.gear]
     low, high = sorted((gear.form_roll, gear.tip_roll))
-    if isinstance(fault, Spall):
-        low, high = max(low, fault.low), min(high, fault.high)
-    elif isinstance(fault, BrokenTip):
-        low, high = (low, fault.roll) if fault.internal else (fault.roll, high)
-    else:
-        return 0.0
+    low, high = max(low, fault.low), min(high, fault.high)
     return max(high**2 - low**2, 0.0) / (2.0 * gear.base_radius)
 
 
@@ -188,19 +188,7 @@ def fault_form(
     callable
         Of roll lengths (meshes, P, pairs, n) on gear 1 and gear 2.
     """
-    meshes = [mesh for mesh in gears.meshes if mesh.kind == kind]
-    acting = []
-    for fault in (fault for fault in faults if fault.separates):
-        for place in (0, 1):
-            on = np.zeros(tooth.shape[1:], bool)
-            for row, mesh in enumerate(meshes):
-                body = gears.bodies[mesh.bodies[place]]
-                same = body.gear == fault.gear and body.copy == fault.copy
-                if same and fault.flank in (None, sides[place, row]):
-                    teeth = gears.gears[body.gear].teeth
-                    on[row] = fault.tooth is None or (tooth[place, row] - fault.tooth) % teeth == 0
-            if on.any():
-                acting.append((fault, place, on))
+    acting = list(_acting([fault for fault in faults if fault.separates], gears, kind, tooth, sides))
     if not acting:
         return None
 
@@ -212,3 +200,48 @@ def fault_form(
         return apart
 
     return separation
+
+
+def flank_limits(
+    faults: Sequence[ToothFault], gears: GearSet, kind: int, tooth: np.ndarray, sides: np.ndarray, whole: np.ndarray
+) -> np.ndarray | None:
+    """Find where the flanks of pairs end of which a tip may be broken off, as roll lengths [m].
+
+    Parameters
+    ----------
+    faults, gears, kind, tooth, sides
+        As of `fault_form`.
+    whole : (2, 2) array
+        Smallest and largest roll length [m] of whole flanks of gear 1 and gear 2.
+
+    Returns
+    -------
+    (2, 2, meshes, P, pairs) array or None
+        Smallest and largest roll length [m] of the flanks of gear 1 and gear 2; None where all are whole.
+    """
+    acting = list(_acting([fault for fault in faults if isinstance(fault, BrokenTip)], gears, kind, tooth, sides))
+    if not acting:
+        return None
+    limits = np.broadcast_to(whole[:, :, None, None, None], (2, 2, *tooth.shape[1:])).copy()
+    for fault, place, on in acting:
+        end, inner = (0, np.maximum) if fault.internal else (1, np.minimum)
+        limits[place, end][on] = inner(limits[place, end][on], fault.roll)
+    return limits
+
+
+def _acting(
+    faults: Sequence[Fault], gears: GearSet, kind: int, tooth: np.ndarray, sides: np.ndarray
+) -> Iterator[tuple[Fault, int, np.ndarray]]:
+    """Faults that meet in meshes of a kind: on gear 1 (0) or gear 2 (1), and at which (meshes, P, pairs)."""
+    meshes = [mesh for mesh in gears.meshes if mesh.kind == kind]
+    for fault in faults:
+        for place in (0, 1):
+            on = np.zeros(tooth.shape[1:], bool)
+            for row, mesh in enumerate(meshes):
+                body = gears.bodies[mesh.bodies[place]]
+                same = body.gear == fault.gear and body.copy == fault.copy
+                if same and fault.flank in (None, sides[place, row]):
+                    teeth = gears.gears[body.gear].teeth
+                    on[row] = fault.tooth is None or (tooth[place, row] - fault.tooth) % teeth == 0
+            if on.any():
+                yield fault, place, on

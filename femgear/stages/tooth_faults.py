@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 _LEFT_OUT = {
     MissingTooth: "the body keeps its compliance: the teeth beside the gap have the rim of a whole gear",
-    BrokenTip: "the tooth that is left keeps the compliance of a whole one, and its new edge has no limit of pressure",
+    BrokenTip: "the tooth that is left keeps the compliance of a whole one, and pressure at its new edge has no limit",
     Spall: "a pit that only separates flanks leaves out that the tooth has lost material, some per cent of the "
     "transmission error; pressures at its edges have no limit",
     Crack: "faces of the crack touch without friction, the crack does not grow, and stresses in the root of its tooth "

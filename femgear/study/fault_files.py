@@ -140,7 +140,7 @@ def machine_contents(plan: FaultPlan, records: MachineRecords, rows: slice = sli
     }
     attrs = {**labels, "size": fault.size, "torque": records.case.operation.torque, "machine": records.machine}
     attrs |= {"plan": plan.fingerprint, "seed": plan.seed, "noise": plan.noise, "case": records.case.source}
-    return Contents(variables, coords, attrs | {"error": records.error})
+    return Contents(variables, coords, attrs | {"error": " ".join(records.error.split())})
 
 
 def _labels(plan: FaultPlan, folder: Path, machines: range) -> Iterator[tuple[Any, ...]]:

@@ -108,3 +108,18 @@ def test_a_tooth_without_its_tip_carries_as_long_as_its_flank_is_there(gears, bo
     load = cycle.tooth_load[0].reshape(-1, 27, PER_PERIOD)
     mine, whole = load[(first - 3) % 27 == 0], load[(first - 12) % 27 == 0]
     assert 0 < (mine > 0).sum() < (whole > 0).sum()
+
+
+@pytest.mark.parametrize("number", [0, 2])
+def test_tips_broken_off_all_teeth_make_a_gear_with_another_tip(gears, bodies, number):
+    whole, cut = gears.gears[number], 0.3e-3
+    radius = whole.tip_radius + (cut if whole.internal else -cut)
+    roll = float(np.sqrt(radius**2 - whole.base_radius**2))
+    broken = walk(gears, bodies, BrokenTip(number, 0, None, None, roll=roll, internal=whole.internal), periods=1)
+    member, shorter_gear = ("sun", "planet", "ring")[number], replace(whole, tip_diameter=2.0 * radius)
+    # a tip that is whole, so that flanks are those of where the gears have turned to here too
+    whole_tip = BrokenTip(1, 0, None, None, roll=1.0, internal=False)
+    shorter = walk(replace(gears, **{member: shorter_gear}), bodies, whole_tip, periods=1)
+    assert broken.sun_arc == pytest.approx(shorter.sun_arc, rel=1e-5)  # where gears are held to rest
+    assert broken.stiffness == pytest.approx(shorter.stiffness, rel=1e-4)
+    assert (broken.sun_arc > walk(gears, bodies, periods=1).sun_arc).any()

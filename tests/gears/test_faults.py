@@ -16,6 +16,7 @@ from femgear.gears.faults import (
     Wear,
     fault_form,
     fault_periods,
+    flank_limits,
     missing_length,
 )
 from femgear.gears.planetary import mirrored_set
@@ -33,11 +34,26 @@ def gears():
 def test_faults_take_off_what_they_say():
     assert SPALL.removed(ROLL) == pytest.approx([0.0, 40e-6, 0.0])
     assert np.isinf(MissingTooth(0, 0, 3, None).removed(ROLL)).all()
-    tip = BrokenTip(0, 0, 3, None, roll=5.2e-3, internal=False)
-    assert tip.removed(ROLL).tolist() == [0.0, np.inf, np.inf]
-    assert replace(tip, internal=True).removed(ROLL).tolist() == [np.inf, 0.0, 0.0]
     worn = Wear(0, 0, None, LEFT, roll=(5e-3, 6e-3), depth=(0.0, 8e-6))
     assert worn.removed(ROLL) == pytest.approx([0.0, 4e-6, 8e-6])
+
+
+def test_a_broken_tip_ends_the_flank_of_its_tooth_alone(gears):
+    tooth, sides = np.zeros((2, 3, 1, 2), int), np.zeros((2, 3), int)
+    tooth[0, 1] = [[3, 4]]
+    whole = np.array([[1e-3, 9e-3], [2e-3, 8e-3]])
+    tip = BrokenTip(0, 0, 3, None, roll=5.2e-3, internal=False)
+    limits = flank_limits([tip, SPALL], gears, 0, tooth, sides, whole)
+    assert limits[0, :, 1, 0, 0].tolist() == [1e-3, 5.2e-3]
+    assert limits[0, :, 1, 0, 1].tolist() == [1e-3, 9e-3] == limits[0, :, 0, 0, 0].tolist()
+    assert (limits[1] == whole[1][:, None, None, None]).all()
+    assert flank_limits([SPALL], gears, 0, tooth, sides, whole) is None
+
+    # the tip of an internal tooth is at the smaller roll lengths
+    tooth[1, 2] = 5
+    of_ring = BrokenTip(2, 0, 5, None, roll=4e-3, internal=True)
+    limits = flank_limits([of_ring], gears, 1, tooth, sides, whole)
+    assert limits[1, :, 2, 0, 0].tolist() == [4e-3, 8e-3] and (limits[0] == whole[0][:, None, None, None]).all()
 
 
 def test_lengths_of_missing_parts_are_arcs_of_the_involute(gears):
