@@ -33,6 +33,7 @@ from functools import cached_property
 import numpy as np
 
 from femgear.errors import ConvergenceError
+from femgear.gears.shaft_graph import connected_sets
 from femgear.housing.sensor import ReadOnlyArrays
 from femgear.housing.two_way.carrier_orders import CarrierOrders, MeshPaths, planet_groups
 from femgear.housing.two_way.mesh_fluctuation import CYCLES, MeshFluctuation, gmres
@@ -51,6 +52,8 @@ _SINGULAR = 1e-11
 """Singular value of a scaled system of the means, over the largest, of a motion of the whole that nothing holds."""
 _BENDING = 1e-10
 """Square of a frequency of a free planet, over the highest, of a motion that bends it."""
+_INDEPENDENT = 1e-13
+"""Coupling of two motions of a planet over their own, in mass or stiffness, that is rounding."""
 _ROOM = 64e6
 """Size of the systems that are in memory together [bytes]."""
 
@@ -205,17 +208,45 @@ class RunningStage(ReadOnlyArrays):
             stiffness = stiffness + 1j * omega * self.viscous
         return np.where(rigid, 0.0, 1.0 / stiffness)
 
-    def planet_stiffness(self, omega: np.ndarray, mesh_frequency: float, speed: float) -> np.ndarray:
+    @cached_property
+    def independent_motions(self) -> tuple[np.ndarray, ...]:
+        """Unit vectors (p, n) of the motions of a planet whose inertia and stiffness know nothing of the others.
+
+        Whirls forwards and backwards of round shafts, their axial motions and rotations, and planets of a branch.
+        """
+        whirls = np.eye(len(self.mass), dtype=complex)
+        for i, j in zip(*np.nonzero(self.turning == -1.0), strict=True):
+            whirls[[i, j, i, j], [i, i, j, j]] = np.array([1j, 1.0, -1j, 1.0]) / np.sqrt(2.0)
+        size = np.sqrt(np.maximum(np.diag(self.mass), np.finfo(float).tiny))
+        coupled = np.eye(len(size), dtype=bool)
+        for matrix in (self.mass, self.gyroscopic, self.turning * np.outer(size, size), self.elastic):
+            if matrix is not None:
+                effect = np.abs(whirls.conj().T @ (matrix / np.outer(size, size)) @ whirls)
+                largest = np.sqrt(effect.max(axis=1, initial=0.0))
+                coupled |= effect > _INDEPENDENT * np.outer(largest, largest)
+        sets = connected_sets([np.flatnonzero(row) for row in coupled | coupled.T])
+        return tuple(whirls[:, sorted(members)] for members in sets)
+
+    def planet_stiffness(
+        self, omega: np.ndarray, mesh_frequency: float, speed: float, motions: np.ndarray | None = None
+    ) -> np.ndarray:
         """Dynamic stiffness (..., p, p) of a planet at angular frequencies (...) in the frame of the carrier.
 
-        ``speed`` is that of the carrier, positive for its sense [rad/s].
+        ``speed`` is that of the carrier, positive for its sense [rad/s]; ``motions`` (p, n) are some of its motions,
+        whose stiffness (..., n, n) alone is wanted.
         """
         omega = np.asarray(omega)[..., None, None]
-        rate = 1j * omega * np.eye(len(self.mass)) + self.sense * speed * self.turning
-        inertial = self.mass @ rate @ rate + mesh_frequency * self.gyroscopic @ rate
-        if self.elastic is None:
+        # powers of i omega in M (d/dt + s Omega S)^2 + G (d/dt + s Omega S): one product each for all frequencies
+        turning, spinning = self.sense * speed * self.turning, mesh_frequency * self.gyroscopic
+        still = self.mass @ turning @ turning + spinning @ turning
+        first, mass, elastic = 2.0 * self.mass @ turning + spinning, self.mass, self.elastic
+        if motions is not None:
+            still, first, mass = (motions.conj().T @ matrix @ motions for matrix in (still, first, mass))
+            elastic = None if elastic is None else motions.conj().T @ elastic @ motions
+        inertial = still + 1j * omega * first - omega**2 * mass
+        if elastic is None:
             return inertial
-        return inertial + self.elastic * (1.0 + 1j * self.structure_loss * np.sign(omega))
+        return inertial + elastic * (1.0 + 1j * self.structure_loss * np.sign(omega))
 
     def shared(self, whole: np.ndarray, omega: np.ndarray) -> np.ndarray:
         """Compliances (..., G, C, G, C) by bodies in common at whole orders (...) and frequencies [m/N].
@@ -436,20 +467,22 @@ def _planet_equations(stage: RunningStage, omega: np.ndarray, mesh_frequency: fl
     """Make the equations of a planet at angular frequencies (blocks, b) in the frame of the carrier."""
     count, b = omega.shape
     pushed = stage.approach if stage.rubbing is None else np.hstack([stage.approach, stage.rubbing.approach])
-    C, dynamic = len(stage.stiffness), stage.planet_stiffness(omega, mesh_frequency, speed)
+    C = len(stage.stiffness)
     compliance = np.zeros((count, b, C, pushed.shape[1]), complex)
     if stage.elastic is None:
+        dynamic = stage.planet_stiffness(omega, mesh_frequency, speed)
         rows = np.broadcast_to(pushed, (count, b, *pushed.shape))
         columns = np.broadcast_to(-stage.approach.T, (count, b, *stage.approach.T.shape))
         return _PlanetEquations(np.arange(b), compliance, rows, columns, dynamic)
     # motions that nothing bends have no stiffness at rest, be it in the frame of the carrier or in that of the casing
     still = (np.abs(omega) <= 1.5 * speed).any(axis=0)
-    moving = dynamic[:, ~still]
-    compliance[:, ~still] = stage.approach.T @ np.linalg.solve(
-        moving, np.broadcast_to(pushed, (*moving.shape[:2], *pushed.shape))
-    )
+    for motions in stage.independent_motions:
+        moving = stage.planet_stiffness(omega[:, ~still], mesh_frequency, speed, motions)
+        right = np.broadcast_to(motions.conj().T @ pushed, (*moving.shape[:3], pushed.shape[1]))
+        compliance[:, ~still] += (stage.approach.T @ motions) @ np.linalg.solve(moving, right)
     rigid, bent = stage.rigid_and_bent
-    kept, gone = dynamic[:, still] @ rigid, dynamic[:, still] @ bent
+    dynamic = stage.planet_stiffness(omega[:, still], mesh_frequency, speed)
+    kept, gone = dynamic @ rigid, dynamic @ bent
     inverse = np.linalg.inv(bent.T @ gone)
     through, of_bent = rigid.T @ gone @ inverse, bent.T @ pushed
     compliance[:, still] = of_bent[:, :C].T @ inverse @ of_bent

@@ -11,6 +11,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 
@@ -25,6 +26,7 @@ from femgear.trains.gearbox.contact import (
     given_separation,
     locate_contact_error,
     stage_contact,
+    unequal_separation,
 )
 from femgear.trains.gearbox.geometry import rolling_bearing
 from femgear.trains.gearbox.holding import loose_shafts, without_balance
@@ -43,6 +45,8 @@ _UPRIGHT = 1e-7
 _COARSE, _NEAR, _NEARLY_UPRIGHT = 12, 3e-3, 1e-6
 _SETTLED = 1e-11  # residual force over the largest one
 _LEAST_LOAD = 1e-3  # against which residuals count where nothing loads a gearbox [N]
+# Differences of torque, relative, and of misalignment over the width [m] up to which equal teeth are one contact.
+_COPIED, _COPIED_LENGTH = 1e-9, 1e-14
 # Load of a rolling element over the largest force of the gearbox up to which it is rounding.
 _PRESSED = 1e-9
 _STIFFEST = 1e12  # of a rigid axial bearing of one sense [N/m]
@@ -245,10 +249,7 @@ def solve_deflection(
     for _ in range(case.deflection.passes):
         # stages without load, as of planets far off their places, lie where equal shares would press them
         flows = {stage.name: found.model.flow if found.model.flow.touches(stage.section) else equal for stage in staged}
-        contacts = {
-            stage.name: _contact(model, stage, start, steps, _COARSE if coarse else None, flows[stage.name])
-            for stage in staged
-        }
+        contacts = _contacts(model, staged, start, steps, _COARSE if coarse else None, flows)
         stiffness = {name: contact.stiffness for name, contact in contacts.items()}
         model = gearbox_model(case, load_case, mesh_stiffness=stiffness, estimate=estimate, flow=found.model.flow)
         gap = _gaps(model, staged, contacts, start.slopes)
@@ -285,6 +286,46 @@ def shared_torques(found: Deflection) -> Deflection:
             force = found.mesh_force[list(stage.meshes[: max(len(stage.planets), 1)])].sum()
             factors[stage.name] = float(force * normal / torque)
     return replace(found, model=replace(model, flow=model.flow.with_factors(factors))) if factors else found
+
+
+def _contacts(
+    model: GearboxModel,
+    staged: Sequence[StageModel],
+    start: MeshPositions,
+    steps,
+    positions: int | None,
+    flows: Mapping[str, BoxFlow],
+) -> dict[str, StageContact]:
+    """Contacts of the teeth of all stages by name; those of equal teeth, torque and slopes are one.
+
+    Equal branches of planets are copies of one another, each with the phases of its teeth: a mesh period is the same.
+    """
+    contacts, solved = dict[str, StageContact](), list[StageModel]()
+    for stage in staged:
+        equal = next((other for other in solved if _are_equal(stage, other, start, flows)), None)
+        if equal is None:
+            contacts[stage.name] = _contact(model, stage, start, steps, positions, flows[stage.name])
+            solved.append(stage)
+        else:
+            contacts[stage.name] = contacts[equal.name]
+    return contacts
+
+
+def _are_equal(stage: StageModel, other: StageModel, start: MeshPositions, flows: Mapping[str, BoxFlow]) -> bool:
+    """Whether two stages have the same teeth, and torque and positions that differ by rounding alone."""
+    if type(stage.section) is not type(other.section) or _untitled(stage) != _untitled(other):
+        return False
+    torque, other_torque = (flows[one.name].first_torque(one.section) for one in (stage, other))
+    own, others = list(stage.meshes), list(other.meshes)
+    slopes = start.slopes[own] - start.slopes[others]
+    apart = unequal_separation(start.separations[own]) - unequal_separation(start.separations[others])
+    lengths = [*np.abs(slopes) * (stage.width or 1.0), *np.abs(apart)]
+    return abs(torque - other_torque) <= _COPIED * abs(torque) and max(lengths) <= _COPIED_LENGTH
+
+
+def _untitled(stage: StageModel) -> dict[str, Any]:
+    """Tables of the teeth of a stage without their title."""
+    return {name: table for name, table in (stage.section.teeth or {}).items() if name != "title"}
 
 
 def _contact(

@@ -117,13 +117,17 @@ def solve_box_stress(case: GearboxCase, deflection: Any, *, progress: Progress =
     found: Deflection = deflection.of(case).state
     stages = [stage for stage in found.model.stages if stage.name in found.contacts and stresses_wanted(stage.section)]
     names = found.model.assembly.contacts
-    solved = list[StageStress]()
+    solved, of_contact = list[StageStress](), dict[int, StageStress]()
     for number, stage in enumerate(stages):
         progress("stress", number, len(stages))
         kind = "planetary" if stage.planets else "pair"
         key = f"{kind}[{getattr(case, kind).index(stage.section)}].teeth"
         meshes = tuple(names[mesh].name for mesh in stage.meshes)
-        solved.append(_stage_stress(found, stage.name, key, meshes))
+        # equal branches of planets have one contact, and one state of stress
+        contact = id(found.contacts[stage.name])
+        if contact not in of_contact:
+            of_contact[contact] = _stage_stress(found, stage.name, key, meshes)
+        solved.append(replace(of_contact[contact], name=stage.name, key=key, meshes=meshes))
     return GearboxStressResult(tuple(solved))
 
 

@@ -3,6 +3,7 @@
 import copy
 import math
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -10,12 +11,15 @@ from gearbox_equivalents import elastic_set_tables
 from scipy.optimize import brentq
 from small_gearbox import loose_pair_tables, pair_tables, set_on_shafts, split_pair_tables
 
+from femgear.case import text as case_text
 from femgear.case.gear_set import planetary_set
 from femgear.errors import CaseError, FemgearError
 from femgear.fe.beam import RoundSection
 from femgear.gears.deviations import misaligned_approach, no_deviations
 from femgear.stages.static import solve_static
 from femgear.system.rolling_bearings import bearing_state
+from femgear.trains.drafts import new_case
+from femgear.trains.gearbox import deflection
 from femgear.trains.gearbox.case_file import teeth_of
 from femgear.trains.gearbox.deflection import mesh_separation, mesh_slopes, rolling_bearing, solve_deflection
 from femgear.trains.gearbox.model import gearbox_model
@@ -413,3 +417,55 @@ def test_stages_side_by_side_without_torque_stay_idle():
     tables["operation"]["load_case"][0]["torque"] = {"motor": "0 N m"}
     found = solve_deflection(read_case(tables))
     assert not found.model.flow.torque_shares and not found.mesh_force.any()
+
+
+def stepped_tables(motions, **deflection) -> dict[str, Any]:
+    """Stepped planets with coarse teeth."""
+    tables: dict[str, Any] = case_text.parse(new_case("stepped", planets=3), "")
+    for stage in tables["pair"]:
+        stage["teeth"]["static"] = {"positions": 8, "flank_elements": 8}
+    return tables | {"motions": motions, "deflection": deflection}
+
+
+def both_ways(tables, monkeypatch):
+    """Loaded state with one contact for all that is equal, and with one for every pair."""
+    case = read_case(tables)
+    copied = solve_deflection(case)
+    monkeypatch.setattr(deflection, "_COPIED", -1.0)
+    alone = solve_deflection(case)
+    assert len({id(contact) for contact in alone.contacts.values()}) == 6
+    return copied, alone
+
+
+@pytest.mark.parametrize(
+    "tables",
+    [
+        stepped_tables("plane", passes=1),
+        pytest.param(stepped_tables("space", slices=3), marks=pytest.mark.slow),
+    ],
+    ids=["plane", "space"],
+)
+def test_equal_branches_have_one_contact_and_what_each_alone_has(tables, monkeypatch):
+    copied, alone = both_ways(tables, monkeypatch)
+    assert len({id(contact) for contact in copied.contacts.values()}) == 2
+    np.testing.assert_allclose(copied.motion, alone.motion, rtol=1e-10, atol=1e-10 * np.abs(alone.motion).max())
+    np.testing.assert_allclose(copied.mesh_force, alone.mesh_force, rtol=1e-10)
+    for name, contact in alone.contacts.items():
+        np.testing.assert_allclose(copied.contacts[name].stiffness, contact.stiffness, rtol=1e-10)
+        own, other = (found.result.cycle.deflection for found in (copied.contacts[name], contact))
+        np.testing.assert_allclose(own, other, rtol=1e-10)
+
+
+@pytest.mark.parametrize("broken", ["pin_error", "gravity", "teeth"])
+def test_branches_that_something_makes_unequal_are_solved_each(broken):
+    tables = stepped_tables("plane", passes=1)
+    if broken == "pin_error":
+        next(one for one in tables["shaft"] if one["name"] == "planet 2")["pin_error"] = {"tangential": "1 um"}
+    elif broken == "gravity":
+        tables["gravity"] = {"direction": [0, -1, 0]}
+    else:
+        tables["pair"][0]["teeth"]["static"]["positions"] = 12
+    found = solve_deflection(read_case(tables))
+    # an error leaves the two planets beside it equal, other teeth of a pair all others
+    expected = {"gravity": 6, "pin_error": 4, "teeth": 3}[broken]
+    assert len({id(contact) for contact in found.contacts.values()}) == expected

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from planet_gearboxes import (
     COUNTED,
+    bending_set,
     in_casing,
     known_set,
     lines_apart,
@@ -160,3 +161,20 @@ def test_friction_acts_on_planets_as_on_those_of_a_planetary_stage():
     assert np.abs(heard[0] - heard[1]).max() < 1e-9 * np.abs(heard[1]).max()
     still = solve_running(replace(set_running, rubbing=None), mesh, speed, **options).lines((rows[1] @ box.motion).T)
     assert np.abs(heard[1] - still).max() > 1e-6 * np.abs(still).max()
+
+
+def test_round_planets_that_bend_whirl_both_ways_alone(monkeypatch):
+    """Whirls, axial motions and rotations know nothing of one another: as all motions at once."""
+    state = solve_deflection(read_case(bending_set(0.3, back=False)))
+    excitations = {stage.name: pair_count_excitation(state.model, stage) for stage in state.model.stages}
+    phases = pair_phases(state.model.case, state.model.flow)
+    (around,) = running_sets(state.model.case)
+    stage = branch_stage(state, around, 0, excitations, phases)[0].running
+    sizes = sorted(motions.shape[1] for motions in stage.independent_motions)
+    assert sizes == [2, 2, 4, 4] and sum(sizes) == len(stage.mass)
+    speeds, known = (2000.0, 60.0), {"harmonics": (3, 3), "side_bands": 4, "tolerance": 1e-13}
+    alone = solve_running(stage, *speeds, **known)
+    monkeypatch.setattr(type(stage), "independent_motions", property(lambda stage: (np.eye(len(stage.mass)),)))
+    whole = solve_running(stage, *speeds, **known)
+    np.testing.assert_allclose(alone.modal, whole.modal, rtol=0.0, atol=1e-11 * np.abs(whole.modal).max())
+    np.testing.assert_allclose(alone.force, whole.force, rtol=0.0, atol=1e-11 * np.abs(whole.force).max())
