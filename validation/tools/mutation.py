@@ -90,7 +90,7 @@ class Watch:
         self.order = None if wanted is None else {name: i for i, name in enumerate(wanted)}
         self.limits, self.budget, self.context = limits, budget, context
         self.killer, self.failed, self.ran, self.seconds = "", [], 0, defaultdict(float)
-        self.start, self.running = _cpu(), Path("running").absolute()
+        self.start, self.running = cpu_seconds(), Path("running").absolute()
 
     def pytest_configure(self):
         import hypothesis
@@ -115,7 +115,7 @@ class Watch:
             signal.setitimer(signal.ITIMER_PROF, PATIENCE + 5.0 * self.limits.get(item.nodeid, self.budget))
 
     def pytest_runtest_logstart(self, nodeid):
-        self._begin = _cpu()
+        self._begin = cpu_seconds()
         if self.context:
             self.context(f"{nodeid}|setup")
 
@@ -133,7 +133,7 @@ class Watch:
 
     def pytest_runtest_logfinish(self, nodeid):
         signal.setitimer(signal.ITIMER_PROF, 0.0)
-        self.seconds[nodeid] += _cpu() - self._begin
+        self.seconds[nodeid] += cpu_seconds() - self._begin
         if self.context:
             self.context("")
 
@@ -143,11 +143,12 @@ class Watch:
             self.killer = self.killer or f"{report.nodeid} (import)"
 
     def pytest_runtest_teardown(self):
-        if self.order is not None and _cpu() - self.start > self.budget:
+        if self.order is not None and cpu_seconds() - self.start > self.budget:
             self.session.shouldstop = "the budget is used"
 
 
-def _cpu() -> float:
+def cpu_seconds() -> float:
+    """Seconds of a processor that this process and its children have used."""
     used = os.times()
     return used.user + used.system + used.children_user + used.children_system
 
@@ -392,9 +393,9 @@ def meet(
     """Run one mutant in this process against its tests."""
     path = ROOT / "femgear" / mutant.module
     sys.meta_path.insert(0, Altered(path, mutated(path.read_text(encoding="utf-8"), mutant.number)))
-    start, ran = _cpu(), 0
+    start, ran = cpu_seconds(), 0
     for tests in lines.planned(mutant.module, covering, budget, killers):
-        left = budget - (_cpu() - start)
+        left = budget - (cpu_seconds() - start)
         if tests and left > 0:
             watch = Watch(tests, lines.seconds, left)
             files = list(dict.fromkeys(test.split("::")[0] for test in tests))
