@@ -295,11 +295,11 @@ class StorageError(FemgearError):
 
 
 def checked_numbers(value, key: str, *, code: str, unit: str, kind: type[float] | type[complex] = float) -> np.ndarray:
-    """Convert a value to an array of numbers of its shape.
+    """Convert a value to an array (...) of numbers, of its shape.
 
     Parameters
     ----------
-    value : number or nested sequence
+    value : number or nested sequence (...)
         What the caller was given.
     key : str
         What it is, in the words of the caller.

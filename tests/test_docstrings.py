@@ -1,4 +1,4 @@
-"""What docstrings must hold: every field of every dataclass by its name."""
+"""What docstrings must hold: every field of a dataclass by its name, and shapes of arrays."""
 
 import ast
 import re
@@ -35,3 +35,34 @@ def test_every_field_of_a_dataclass_stands_in_its_docstring():
             missing += [f"{path.relative_to(PACKAGE)}: {node.name}.{one}" for one in fields(node) if one not in names]
     assert count > 1500  # the walk found them
     assert missing == []
+
+
+ARRAYS = re.compile(r"ndarray|NDArray")
+SHAPE = re.compile(r"\((?:\.\.\.|.*,.*|\d+)\)|shape")
+"""A shape in brackets, or words that say where shapes stand."""
+
+
+def public_functions(path: Path) -> list[tuple[str, ast.FunctionDef]]:
+    """All functions of a module, and all methods of its classes, that have no private name."""
+    body = ast.parse(path.read_text(encoding="utf-8")).body
+    functions = [(node.name, node) for node in body if isinstance(node, ast.FunctionDef)]
+    for owner in (node for node in body if isinstance(node, ast.ClassDef) and not node.name.startswith("_")):
+        functions += [(f"{owner.name}.{node.name}", node) for node in owner.body if isinstance(node, ast.FunctionDef)]
+    return [(name, node) for name, node in functions if not node.name.startswith("_")]
+
+
+def test_public_functions_of_arrays_tell_a_shape():
+    """Those without a docstring are described by their protocol or base class."""
+    count, without = 0, []
+    for path in sorted(PACKAGE.rglob("*.py")):
+        for name, node in public_functions(path):
+            arguments = [*node.args.posonlyargs, *node.args.args, *node.args.kwonlyargs]
+            kinds = [one.annotation for one in arguments if one.annotation is not None]
+            kinds += [node.returns] if node.returns is not None else []
+            docstring = ast.get_docstring(node)
+            if docstring is not None and any(ARRAYS.search(ast.unparse(kind)) for kind in kinds):
+                count += 1
+                if not SHAPE.search(docstring):
+                    without.append(f"{path.relative_to(PACKAGE)}: {name}")
+    assert count > 700  # the walk found them
+    assert without == []

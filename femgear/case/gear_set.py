@@ -59,11 +59,13 @@ def _need(kind: type, case: Any) -> None:
 
 
 @overload
-def planetary_set(case: Case) -> PlanetarySet: ...
+def planetary_set(case: Case) -> PlanetarySet:
+    """Make the gears of a planetary set."""
 
 
 @overload
-def planetary_set(case: GearCase) -> Any: ...
+def planetary_set(case: GearCase) -> Any:
+    """Make the gears of a pair, or of a set with planets of any kind."""
 
 
 @remembered(latest=16)

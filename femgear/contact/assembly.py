@@ -162,7 +162,7 @@ class Candidates:
         return np.moveaxis(values_of_pairs, 0, -1)
 
     def images_of(self, bodies: Bodies) -> np.ndarray:
-        """`images`, of the same shape, of other bodies with the same flanks: what differs is computed anew."""
+        """Compute `images` (I, P, W, 3, W, 3) [m/N] of other bodies with the same flanks: what differs, anew."""
         parts = [
             None if compliance is other else replace(other, regular=other.regular - compliance.regular)
             for compliance, other in zip(self.bodies.gears, bodies.gears, strict=True)

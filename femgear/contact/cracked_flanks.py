@@ -192,7 +192,7 @@ class WindowCrack:
     closed: np.ndarray
 
     def at(self, rows: np.ndarray) -> WindowCrack:
-        """Take some of the positions."""
+        """Take some of the positions, by their numbers (P',)."""
         return replace(self, coordinates=self.coordinates[rows], closed=self.closed[rows])
 
     def yielding(self) -> np.ndarray:

@@ -46,7 +46,7 @@ class WindowFriction:
     supports: np.ndarray
 
     def at(self, rows: np.ndarray) -> WindowFriction:
-        """Take some of the positions."""
+        """Take some of the positions, by their numbers (P',)."""
         return WindowFriction(self.factor[rows], self.arms[rows], self.supports[rows])
 
 

@@ -95,8 +95,7 @@ class WidthWaves:
 def wave_displacement(x, depth, wave_number: float, material: Material) -> np.ndarray:
     """Compute the displacement into the half space under a line load ``cos(k z)`` [m per N/m].
 
-    At distances and depths (arrays that broadcast) [m], for a wave number over 0 [1/m]; see the head of the
-    module.
+    At distances and depths (...) [m], which broadcast, for a wave number over 0 [1/m]; see the head of the module.
     """
     from scipy.special import k0, k1
 

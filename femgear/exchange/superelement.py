@@ -171,7 +171,10 @@ def superelement_of(
     table: tuple[Node, ...],
     units: str,
 ) -> Superelement:
-    """Make the superelement of stiffness and mass in the units of a file, rows by node and component, places, nodes."""
+    """Make the superelement of the stiffness and the mass (n, n) of a file, in its units.
+
+    Their rows are known by node and component, places (3,) by node; ``table`` has the nodes.
+    """
     _check_real(matrices)
     apart = [float(np.abs(matrix - matrix.T).max() / np.abs(matrix).max()) for matrix in matrices]
     length, mass = UNITS[units]

@@ -526,7 +526,7 @@ def static_cut_shapes(schur: SectorSchur, harmonics) -> np.ndarray:
 def sector_harmonics(schur: SectorSchur, harmonics) -> np.ndarray:
     """Compute the compliance [m/N] of each cyclic harmonic.
 
-    It is complex (len(harmonics), 2 n_observations, 2 n_loads): with the images of all observations behind
+    It is a complex array (n_harmonics, 2 n_observations, 2 n_loads): with the images of all observations behind
     them, and those of all loads.
 
     GridError: E-GRID-FREE: the body can move freely.

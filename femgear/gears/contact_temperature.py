@@ -32,7 +32,7 @@ def hertz_pressure(line_load: Any, radius: Any, modulus: float) -> Any:
 
     Parameters
     ----------
-    line_load, radius : float or array
+    line_load, radius : float or (...) array
         Normal load over the length of the line [N/m], and radius of relative curvature [m].
     modulus : float
         E_r of `reduced_modulus` [Pa].
@@ -61,11 +61,11 @@ def flash_temperature(
 
     Parameters
     ----------
-    friction : float or array
-        Coefficient of friction.
-    line_load, half_width : float or array
+    friction : float or (...) array
+        Coefficient of friction; the arrays broadcast.
+    line_load, half_width : float or (...) array
         [N/m], [m]
-    rolling_1, rolling_2 : float or array
+    rolling_1, rolling_2 : float or (...) array
         Speeds of both surfaces [m/s].
     coefficients : tuple of float
         Thermal contact coefficients of gear 1 and gear 2 [W s^0.5/(m^2 K)].
@@ -89,8 +89,8 @@ def path_load_sharing(pair: GearPair, path: Any, overlap: float = 0.0, base_heli
 
     Parameters
     ----------
-    path : array
-        [m]
+    path : (...) array
+        Places on the line of action from the pitch point [m].
     overlap : float
         Overlap ratio [1].
     base_helix : float
@@ -126,7 +126,7 @@ def bulk_temperature_of_flash(oil: float, mean_flash: Any, *, supply: float, mes
     ----------
     oil : float
         Temperature of the oil [K or degrees Celsius], as the result.
-    mean_flash : float or array
+    mean_flash : float or (...) array
         Mean of the flash temperature over the path [K].
     supply : float
         X_S, see `SUPPLY`.
@@ -144,7 +144,7 @@ def bulk_temperature_of_losses(oil: float, loss: Any, centre_distance: float, wi
 
     Parameters
     ----------
-    loss : float or array
+    loss : float or (...) array
         ``P mu H_V`` of the mesh [W].
     centre_distance, width : float
         [m]

@@ -158,11 +158,11 @@ def schlenk_friction(
 
     Parameters
     ----------
-    line_load : float or array
+    line_load : float or (...) array
         Force at the base circle over face width [N/m]; below 150 N/mm that counts, as the report has it.
-    sum_speed : float or array
+    sum_speed : float or (...) array
         Sum of the surface speeds at the pitch point [m/s], at most 50 m/s counts.
-    radius : float or array
+    radius : float or (...) array
         Radius of relative curvature at the pitch point in the normal section [m].
     viscosity : float
         Dynamic viscosity of the oil at its temperature in operation [Pa s].

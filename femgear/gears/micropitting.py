@@ -73,20 +73,20 @@ def oil_state(at_40: float, at_100: float, density_15: float, kind: str, tempera
 def film_thickness(
     radius: Any, modulus: float, sum_speed: Any, pressure: Any, bodies: OilState, contact: OilState
 ) -> np.ndarray:
-    """Compute the film thickness h_Y [m], of the shape that all arrays broadcast to.
+    """Compute the film thickness h_Y (...) [m], of the shape that all arrays broadcast to.
 
     ``h = 1600 rho G_M^0.6 U^0.7 W^-0.13 S_GF^0.22`` in um and mm, with ``G_M = alpha E_r``, ``U = eta v_sum / (2 E_r
     rho)``, ``W = 2 pi p^2 / E_r^2`` and ``S_GF = alpha_B eta_B / (alpha_M eta_M)``.
 
     Parameters
     ----------
-    radius : float or array
+    radius : float or (...) array
         Radius of relative curvature in the normal section [m].
     modulus : float
         E_r [Pa].
-    sum_speed : float or array
+    sum_speed : float or (...) array
         Sum of the speeds of both surfaces [m/s].
-    pressure : float or array
+    pressure : float or (...) array
         Largest pressure of the contact [Pa].
     bodies, contact : OilState
         At the temperature of the teeth, and at that of the contact.

@@ -327,14 +327,14 @@ def cutter_rounding(distance, centre_radius: float, rounding: float, stretch: fl
 
     Parameters
     ----------
-    distance : float or array
+    distance : float or (...) array
         Between normal and axis [m], from 0 to the centre's radius; beyond it the nearest point is given.
     centre_radius, rounding, stretch : float
         As of `CutterTip` [m, m, 1].
 
     Returns
     -------
-    normal, along, angle : float or array
+    normal, along, angle : float or (...) array
         Angle of the normal against the radius through the centre of the rounding [rad], place of the point
         along the normal from the foot of the perpendicular from the axis [m], and angle of the point at the
         axis from that radius [rad].

@@ -88,9 +88,9 @@ def nodal_diameters(lines: SensorLines) -> np.ndarray:
 
 
 def pressure_transfer(n, frequency, cylinder: Cylinder, distance: float = 0.0) -> np.ndarray:
-    """Compute the sound pressure over the velocity of the surface [Pa s/m], complex, of one angle.
+    """Compute the sound pressure over the velocity of the surface (...) [Pa s/m], complex, of one angle.
 
-    For nodal diameters and frequencies [Hz] of shapes that broadcast, at a distance from the surface [m],
+    For nodal diameters and frequencies (...) [Hz], which broadcast, at a distance from the surface [m],
     over 0 unless the cylinder is without end. At 0 Hz there is none. Formulas: see the head of this module.
     """
     n, frequency = np.broadcast_arrays(np.abs(n), np.asarray(frequency, float))
@@ -127,9 +127,9 @@ def _ring_transfer(ka: np.ndarray, cylinder: Cylinder, distance: float) -> Itera
 
 
 def radiation_efficiency(n, ka, slenderness: float = np.inf) -> np.ndarray:
-    """Compute the radiation efficiency of a ring in a cylinder: its power over that of rho c v^2.
+    """Compute the radiation efficiency (...) of a ring in a cylinder: its power over that of rho c v^2.
 
-    For nodal diameters n and numbers ka > 0 of shapes that broadcast, of a ring of width over radius b/a; of
+    For nodal diameters n and numbers ka > 0 (...), which broadcast, of a ring of width over radius b/a; of
     the whole cylinder when not given. Formulas: see the head of this module.
     """
     n, ka = np.broadcast_arrays(np.abs(n), np.asarray(ka, float))

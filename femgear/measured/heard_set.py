@@ -46,7 +46,7 @@ class HeardSet:
         return self.ring, self.sun, self.planet
 
     def symmetric_orders(self, harmonics: int) -> np.ndarray:
-        """Orders near the first mesh harmonics that the symmetry of the spacing allows, ascending."""
+        """Find orders (n,) near the first mesh harmonics that the symmetry of the spacing allows, ascending."""
         symmetry, beside = spacing_symmetry(self.angles), np.arange(-_BESIDE, _BESIDE + 1)
         orders = (np.arange(1, harmonics + 1)[:, None] * self.ring + beside).ravel()
         return np.unique(orders[(orders % symmetry == 0) & (orders > 0)])

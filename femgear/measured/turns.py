@@ -42,7 +42,7 @@ class Turns:
     turns: np.ndarray
 
     def times(self, turns: np.ndarray) -> np.ndarray:
-        """Times [s] at which the shaft has made so many turns, by a cubic spline."""
+        """Find the times (n,) [s] at which the shaft has made so many turns (n,), by a cubic spline."""
         from scipy.interpolate import CubicSpline
 
         if len(self.time) == 2:

@@ -423,7 +423,7 @@ def fluctuation_rms(dynamics: xr.Dataset) -> np.ndarray:
 
 
 def stored_harmonics(dynamics: xr.Dataset, name: str) -> np.ndarray:
-    """Join real and imaginary part of a variable to a complex array, in its dimensions and unit."""
+    """Join real and imaginary part of a variable to a complex array (...), in its dimensions and unit."""
     return dynamics[f"{name}_real"].values + 1j * dynamics[f"{name}_imag"].values
 
 

@@ -213,7 +213,7 @@ def _waves(modes: xr.Dataset, mode: int) -> list[list[float]]:
 
 
 def packed_values(values: np.ndarray) -> dict[str, Any]:
-    """Whole numbers of sixteen bits and what one of them is worth."""
+    """Write values (...) as whole numbers of sixteen bits, and what one of them is worth."""
     largest = float(np.abs(values).max(initial=0.0)) or 1.0
     whole = np.round(values * (32767 / largest)).astype("<i2")
     return {"unit": largest / 32767, "values": base64.b64encode(whole.tobytes()).decode("ascii")}

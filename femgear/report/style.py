@@ -184,7 +184,7 @@ def _highest(x, amplitude, shown) -> np.ndarray:
 
 
 def thinned(x, y) -> tuple[np.ndarray, np.ndarray]:
-    """Leave out points of a long curve that lie between the largest and the smallest of every step.
+    """Leave out points of a long curve x, y (n,) that lie between the largest and the smallest of every step.
 
     Steps are of equal numbers of points, far narrower than a pixel of the widest picture. Parts between gaps
     (nan) stay parts; of more than can be told apart, the highest one of every column is kept. Curves that run

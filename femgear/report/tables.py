@@ -175,7 +175,7 @@ def lower_bound(value: float) -> str:
 
 
 def level_change_at(data: xr.Dataset, speed) -> np.ndarray:
-    """Find what a longer excitation changes the level of runup.nc at speeds [rpm] [dB], NaN unknown.
+    """Find what a longer excitation changes the level of runup.nc [dB] at speeds (...) [rpm], NaN unknown.
 
     Between the speeds that were looked at on a straight line.
     """

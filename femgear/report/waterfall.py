@@ -323,7 +323,7 @@ def _name_resonances(ax, runup: xr.Dataset) -> None:
 
 
 def runup_figures(runup: xr.Dataset, modes: xr.Dataset, limit: np.ndarray | None = None) -> Drawings:
-    """Draw the figures of a run-up by the names of their files; ``limit`` as of `runup_levels`."""
+    """Draw the figures of a run-up by the names of their files; ``limit`` (n_speeds,) as of `runup_levels`."""
     return Drawings(
         {
             "run_up_levels": partial(runup_levels, runup, limit),

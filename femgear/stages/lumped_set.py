@@ -279,7 +279,7 @@ class Bearings:
         return replace(system, W=np.hstack(columns))
 
     def elements(self, data: RigidSet, groups: dict[str, np.ndarray]) -> tuple[RadialBearings, ...]:
-        """Make the bearings of a set on their places, ``groups`` of `columns`."""
+        """Make the bearings of a set on their places; ``groups`` (g, 2) of columns are those of `columns`."""
         elements = []
         if self.planet_clearance is not None:
             stiffness = data.pin_stiffness[:, 0]

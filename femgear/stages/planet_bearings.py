@@ -154,7 +154,7 @@ def planet_bearings(
         A planetary set, or a pair.
     cycles : sequence of MeshCycle or None
         Static solutions of the load cases.
-    carrier_speed, mesh_frequency, shares : sequences of float
+    carrier_speed, mesh_frequency, shares : (n_cases,) sequences of float
         Of the load cases [rad/s, Hz, 1].
     """
     if not gears.repeated[BRANCH] or case.planet.dynamic_rating is None:

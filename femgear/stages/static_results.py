@@ -539,7 +539,7 @@ class StressResult(StageResult):
     def worst_roots(self) -> dict[str, np.ndarray]:
         """Find the largest stress in the root of the loaded flank of every gear in every mesh, and its place.
 
-        Over the record and the positions between, by the names of `STRESS_VARIABLES`.
+        Over the record and the positions between, by the names of `STRESS_VARIABLES`, (meshes, 2, ...) each.
         """
         rows, position = [], self.cycle.position
         each = len(position) // self.cycle.periods

@@ -586,8 +586,10 @@ def rate_case(
         On the sun or gear 1 [N m], by default the case's.
     frequencies : sequence of float, optional
         Mesh frequencies [Hz], by default those of the operating speeds.
-    sharing, dynamic, face, strength
-        As for `mesh_load_factors`.
+    sharing, dynamic, face : (k,) arrays, optional
+        Load factors, see `mesh_load_factors`.
+    strength : StrengthSection, optional
+        By default that of the case.
     """
     driving = float(case.torque_on_first_gear() if torque is None else torque)
     nominal = case_stresses(case, driving, strength)

@@ -69,7 +69,10 @@ class StressReason:
 
 
 def reason_values(gears: GearSet, nominal: NominalStresses) -> dict[str, np.ndarray]:
-    """Collect what stress.nc needs of geometry and nominal stresses to tell reasons, by the names of its variables."""
+    """Collect what stress.nc needs of geometry and nominal stresses to tell reasons, by the names of its variables.
+
+    Of meshes (M,), of gears in meshes (M, 2).
+    """
     ends = np.array([pair.path for pair in gears.kinds]) / gears.base_pitch
     rims = [
         [1.0 if root is None else root.rim for root in (nominal.roots[kind] if nominal.roots else (None, None))]

@@ -30,7 +30,7 @@ class Labelled:
         self.values, self.dims, self.attrs, self._parent = np.asarray(values), dims, dict(attrs), parent
 
     def to_xarray(self) -> xr.DataArray:
-        """Make the array of xarray, with the coordinates of its dimensions."""
+        """Make the array (...) of xarray, with the coordinates of its dimensions."""
         import xarray as xr
 
         coords = self._parent().coordinates_along(self.dims)

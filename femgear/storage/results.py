@@ -116,7 +116,7 @@ def coordinates(**values: object) -> dict[str, tuple]:
 
 
 def as_written(values) -> np.ndarray:
-    """Round values to 13 digits: 3100 rpm, which rad/s make 3099.9999999999995, are 3100 again."""
+    """Round values (n,) to 13 digits: 3100 rpm, which rad/s make 3099.9999999999995, are 3100 again."""
     return np.array([float(f"{value:.13g}") for value in np.asarray(values, float)])
 
 

@@ -104,7 +104,7 @@ class EntrySamples:
 
     @property
     def whole(self) -> np.ndarray:
-        """Numbers of the samples that can be computed."""
+        """Numbers (n,) of the samples that can be computed."""
         return np.flatnonzero(~np.isnan(self.values).any(axis=1))
 
     @property

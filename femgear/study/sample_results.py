@@ -474,7 +474,7 @@ class Columns:
         self._bytes = 8 * int(self._ends[-1])
 
     def write(self, first: int, numbers: Mapping[str, np.ndarray]) -> str:
-        """Write the numbers of samples from ``first`` on, and force them out; give their checksum."""
+        """Write numbers (n,) or (n, width) of samples from ``first`` on, and force them out; give their checksum."""
         parts = [np.asarray(numbers[name], float) for name in self._widths]
         data = np.column_stack(parts).tobytes()
         with storage_errors(self._path):
@@ -490,19 +490,19 @@ class Columns:
         return _checksum(self._read(first, end)) == checksum
 
     def rows(self, first: int, end: int) -> dict[str, np.ndarray]:
-        """Numbers of samples ``first`` to ``end - 1``."""
+        """Read numbers (end - first,) or (end - first, width) of samples ``first`` to ``end - 1``, by their names."""
         table = np.frombuffer(self._read(first, end)).reshape(end - first, -1)
         parts = np.split(table, self._ends[:-1], axis=1)
         named = zip(self._widths.items(), parts, strict=True)
         return {name: part if width else part[:, 0] for (name, width), part in named}
 
     def blocks(self, count: int) -> Iterator[tuple[int, dict[str, np.ndarray]]]:
-        """Give number and numbers of the first of some samples at a time, of ``count`` in all."""
+        """Give the number of the first of some samples at a time, of ``count`` in all, and their `rows` (n, ...)."""
         for first in range(0, count, _ROWS):
             yield first, self.rows(first, min(first + _ROWS, count))
 
     def column(self, name: str, count: int) -> np.ndarray:
-        """One number of the first ``count`` samples."""
+        """Read one number (count,) or (count, width) of the first ``count`` samples."""
         width = self._widths[name]
         column_ = np.empty((count, width) if width else count)
         for first, rows in self.blocks(count):

@@ -113,7 +113,7 @@ NUMBERS = {
 def share_quantiles(
     share: np.ndarray, *, distribution: str, mean: float, sigma: float | None, limit: float | None
 ) -> np.ndarray:
-    """Find the values of a law below which the given shares of all lie, an array of the same shape.
+    """Find the values of a law (...) below which the given shares (...) of all lie.
 
     Uniform between mean -+ limit, or normal, there cut off at mean -+ limit where one is given.
     """
@@ -166,7 +166,7 @@ class Law(Section):
         return self
 
     def at(self, share: np.ndarray) -> np.ndarray:
-        """Find the errors [m] below which the given shares of all lie, an array of the same shape."""
+        """Find the errors (...) [m] below which the given shares (...) of all lie."""
         kind = self.distribution
         return share_quantiles(share, distribution=kind, mean=self.mean, sigma=self.sigma, limit=self.limit)
 
@@ -723,7 +723,7 @@ def sample_positions(basis: DesignBasis, sun_torque: float, positions: int) -> n
 def sample_block(
     model: SampleModel, seed: int, first: int, count: int, *, exact: bool = False
 ) -> dict[str, np.ndarray]:
-    """Compute what `solve_samples` gives for samples ``first`` to ``first + count - 1`` of a seed."""
+    """Compute what `solve_samples` gives (count, ...) for samples ``first`` to ``first + count - 1`` of a seed."""
     return solve_samples(model, model.draw(seed, first, count), exact=exact)
 
 
@@ -776,7 +776,7 @@ spring_numbers, exact_numbers = partial(solve_samples, exact=False), partial(sol
 
 
 def joined(parts: Sequence[dict[str, np.ndarray]]) -> dict[str, np.ndarray]:
-    """Join the numbers of samples that follow one another."""
+    """Join the numbers (n, ...) of samples that follow one another, by their names."""
     return {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
 
 

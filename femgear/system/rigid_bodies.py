@@ -439,7 +439,7 @@ def check_support(key: str, support: HelicalSupport, *, count: int | None = None
 
 
 def checked_array(key: str, values, dimensions: int | None = None) -> np.ndarray:
-    """Make an array of floats of the shape of the values, and check the number of its dimensions where it is given."""
+    """Make an array (...) of floats of the values, and check the number of its dimensions where it is given."""
     try:
         array = np.array(values, float)
     except (TypeError, ValueError):

@@ -236,7 +236,7 @@ def from_arrays(arrays: Mapping[str, object], *, direction, max_diameter: int) -
 
     Parameters
     ----------
-    arrays : mapping of str to array
+    arrays : mapping of str to (...) array
         ``natural_frequency`` (m,) [rad/s] of mass-normalised modes; ``damping_ratio`` () or (m,);
         ``ring_angle`` (p,), housing angles of the points [rad], all around in any order, at least four a
         nodal diameter; ``ring_shape`` (m, p, 2), displacement there outwards and counter-clockwise

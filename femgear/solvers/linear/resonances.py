@@ -165,7 +165,7 @@ def refined_speeds(speeds: np.ndarray, resonance: np.ndarray, level_times_dampin
 
 
 def merged_speeds(*lists: np.ndarray) -> np.ndarray:
-    """Merge speeds, ascending; of those that differ by rounding alone the one of the earliest list is kept.
+    """Merge lists (n,) of speeds, ascending; of those that differ by rounding the one of the earliest list is kept.
 
     Several harmonics meet different modes at one speed where natural frequencies have whole ratios, which
     gives that speed again but for its last digits.

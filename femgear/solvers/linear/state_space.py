@@ -100,12 +100,12 @@ class ModalModel:
 
     @property
     def rotations(self) -> np.ndarray:
-        """Numbers of the outputs that are rotations."""
+        """Numbers (n,) of the outputs that are rotations."""
         return np.flatnonzero([port.unit == "rad" for port in self.outputs])
 
     @property
     def accelerations(self) -> np.ndarray:
-        """Numbers of the outputs whose accelerations are outputs, too."""
+        """Numbers (n,) of the outputs whose accelerations are outputs, too."""
         return np.flatnonzero([port.accelerates for port in self.outputs])
 
 

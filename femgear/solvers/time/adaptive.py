@@ -162,7 +162,7 @@ def trajectory(
 
     Parameters
     ----------
-    start : array
+    start : (n,) array
         State, of ``Flow.state``.
     begin, end : float
         [s].

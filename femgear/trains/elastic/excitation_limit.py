@@ -97,7 +97,10 @@ and limits of the excitation at these."""
 def lines_on_foundation(
     case: Case, modes: ModesResult, frequency: np.ndarray, carrier: np.ndarray, limit: FrequencyLimit
 ) -> SensorLines:
-    """Lines of the sensor of a ring on its foundation, see `Heard`."""
+    """Compute lines of the sensor of a ring on its foundation, see `Heard`.
+
+    At mesh frequencies (n,) [Hz] and speeds (n,) of the carrier [rad/s].
+    """
     response = solve_spectral(modes.modes, modes.excitation, frequency, **limit.options(case), radius=False)
     return sensor_lines(case, modes, response, carrier)
 

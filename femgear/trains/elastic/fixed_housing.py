@@ -180,7 +180,7 @@ class HousingModel:
 def fixed_housing(
     case: Case, modes: ModesResult, carrier: np.ndarray, limit: FrequencyLimit, *, judged_at: object = ()
 ) -> FixedHousing:
-    """Make the structure of ring and casing, and solve for forces at speeds of the carrier [rad/s].
+    """Make the structure of ring and casing, and solve for forces at speeds (n,) of the carrier [rad/s].
 
     Of the set in it, and in the ring on its foundation alone; the excitation has a limit at every speed.
     Those number ``judged_at`` get a Floquet verdict.
@@ -211,7 +211,9 @@ def fixed_housing(
 def lines_at_sensor(
     case: Case, modes: ModesResult, frequency: np.ndarray, carrier: np.ndarray, limit: FrequencyLimit
 ) -> SensorLines:
-    """Lines of the sensor that has the level in a housing that stands still, roughly.
+    """Compute lines of the sensor that has the level in a housing that stands still, roughly.
+
+    At mesh frequencies (n,) [Hz] and speeds (n,) of the carrier [rad/s].
 
     See `femgear.trains.elastic.excitation_limit.Heard`; of errors that turn the mean alone.
     """

@@ -32,7 +32,10 @@ def sensor_lines(case: Case, modes: ModesResult, response: Response, carrier: np
 
 
 def lines_of_field(case: Case, modes: ModesResult, field: np.ndarray, carrier: np.ndarray) -> SensorLines:
-    """Lines of the fixed sensor by the radial field of the ring, see `mesh_and_ring_outputs`."""
+    """Compute lines of the fixed sensor by the radial field of the ring (speeds, harmonics, diameters) [m].
+
+    See `mesh_and_ring_outputs`; at speeds (n,) of the carrier [rad/s].
+    """
     options = {"symmetry": modes.symmetry, "periods": modes.excitation.periods}
     return component_lines(field, case.ring.teeth, carrier, case.housing.sensor_angle, **options)
 

@@ -968,7 +968,7 @@ def sensor_signals(results: Results, sampling: Sampling) -> Iterator[Signal]:
 
 
 def run_up_lines(runup: xr.Dataset, attributes: Mapping[str, Any]) -> tuple[SensorLines, np.ndarray | None]:
-    """Read the lines of the sensor from runup.nc, and compute those of the microphone [Pa].
+    """Read the lines of the sensor from runup.nc, and compute those of the microphone (n_speeds, n_orders) [Pa].
 
     ``attributes`` are those of housing.nc: places of both, ring and air. A housing that stands still has
     several nodal diameters a line, and no microphone there.
@@ -994,7 +994,8 @@ def signal_extent(results: Results, rate: float) -> dict[str, tuple[float, float
 def order_cuts(results: Results, form: str) -> tuple[list[str], np.ndarray]:
     """Tabulate levels of the sensor over the speeds of runup.nc: of all lines, of the strongest orders.
 
-    The last column tells what a longer excitation changes the level of all lines [dB], NaN unknown.
+    The table (n_speeds, columns) has the units of its heads. Its last column tells what a longer excitation changes the
+    level of all lines [dB], NaN unknown.
     """
     lines = run_up_lines(results.runup, results.housing.attrs)[0]
     fluctuating = lines.order > 0

@@ -92,7 +92,7 @@ def largest_foot_force(data: Any) -> Iterator[tuple[str, str]]:
 
 
 def seat_curve(one: xr.Dataset, way: int) -> tuple[np.ndarray, np.ndarray, np.ndarray] | None:
-    """Find place along z [mm], motions along x or y [um] of casing and shaft at its bearings, of one load case.
+    """Find places (n,) along z [mm], motions (n,) along x or y [um] of casing and shaft at bearings, of a load case.
 
     Bearings between shafts, as of planets, have no seat in the casing.
     """

@@ -111,7 +111,7 @@ def spectrum_lives(states: Sequence[Deflection], shares: Sequence[float] | np.nd
 
 
 def life_variables(states: Sequence[Deflection], shares: Sequence[float] | np.ndarray) -> dict[str, tuple]:
-    """Variables of deflection.nc on the lives of bearings."""
+    """Make the variables of deflection.nc on the lives of bearings; shares (n_cases,) of the time [1]."""
     lives = np.array([bearing_lives(state) for state in states]).reshape(len(states), -1, 3)
     over = spectrum_lives(states, shares)
     at, every = "load_case bearing", "over all load cases"

@@ -152,7 +152,7 @@ class GearboxModel:
 
     @cached_property
     def places(self) -> np.ndarray:
-        """Numbers of the stations that are places, unlike elastic motions of the casing."""
+        """Numbers (n,) of the stations that are places, unlike elastic motions of the casing."""
         elastic = () if self.casing is None else self.casing.elastic
         return np.setdiff1d(np.arange(len(self.assembly.names)), elastic)
 

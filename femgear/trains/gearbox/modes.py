@@ -239,7 +239,7 @@ def _in_modes(still: MechanicalSystem, stiffness, gyroscopic, speed: float, coun
 
 
 def count_modes(system: MechanicalSystem, stiffness: np.ndarray, top: float | None) -> int:
-    """Count modes up to a frequency [Hz], `_LEAST` or more; all without one."""
+    """Count modes up to a frequency [Hz], `_LEAST` or more; all without one. Columns have ``stiffness`` (c,) [N/m]."""
     if top is None:
         return len(system.dofs)
     whole = undamped_modes(system, stiffness, damping_ratio=0.0)

@@ -124,7 +124,10 @@ def gear_loads(
     shares: Sequence[float] | np.ndarray,
     torque: np.ndarray,
 ) -> GearLoads:
-    """Collect the loads of a gear from flows and ratings of all load cases, with their shares of the time."""
+    """Collect the loads of a gear from flows and ratings of all load cases.
+
+    These have shares (n_cases,) of the time [1] and a torque (n_cases,) on gear 1 of its first stage [N m].
+    """
     push = np.array([gear.pushes(flow) for flow in flows])
     flanks = [
         [

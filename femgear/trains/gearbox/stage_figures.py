@@ -50,7 +50,7 @@ def draw_stage_energy(modes: xr.Dataset) -> Figure | None:
 
 
 def end_with_speeds(ax, speed: np.ndarray) -> None:
-    """Let the abscissa end with the speeds of the curves; a single speed has markers, and a tenth to both sides."""
+    """Let the abscissa end with the speeds (n,) of the curves; a single one has markers, and a tenth to both sides."""
     if np.ptp(speed) > 0.0:
         ax.set_xlim(speed.min(), speed.max())
         return
