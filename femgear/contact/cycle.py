@@ -7,7 +7,7 @@ it is the mirror image of a set under a positive one (`femgear.contact.flank_pai
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
 from itertools import pairwise
@@ -21,6 +21,20 @@ from femgear.contact.batch import BatchState, ContactTangents, check_definite, c
 from femgear.contact.bodies import Bodies
 from femgear.contact.face_width import FaceWidth, contact_over_width, over_slices
 from femgear.contact.flank_friction import friction_of_record
+from femgear.contact.mapped_cycle import (
+    AXES,
+    BETWEEN,
+    FRICTION,
+    PRESSED,
+    PRESSURES,
+    SLICED,
+    in_slots,
+    mapped_members,
+    repeated_record,
+    rotation_matrix,
+    same_pairs,
+    seen_from_front,
+)
 from femgear.contact.mesh_cycle import Between, MeshCycle
 from femgear.contact.omitted_pairs import needed_nearest
 from femgear.contact.peaks import (
@@ -128,30 +142,6 @@ class CycleOptions:
         return replace(self, planet_gaps=gaps, ahead=None if self.ahead is None else -self.ahead)
 
 
-_PRESSURES = ("pressure", "pressure_offset", "pressure_centre")
-_OVER_MESHES = ("deflection", "force", "back_force", "stiffness", "max_pressure", "edge_contact")
-_PRESSED = ("pressed_path", "pressed_load")
-FRICTION = ("friction_force", "friction_moment")
-"""What there is of meshes whose flanks rub."""
-_SLICED = ("slice_load", "slice_pressure", "mesh_misalignment", "lead_offset")
-_AXES = {
-    "mt": (*_OVER_MESHES, *_PRESSED, "held_stiffness", "mesh_misalignment", "lead_offset", *FRICTION),
-    "mst": ("tooth_load", "path", "back_tooth_load", "back_path", "pressure_centre"),
-    "gms": ("tooth", "back_tooth"),
-    "t": ("sun_arc", "residual", "iterations"),
-    "nt": ("open_planets",),
-    "mmt": ("held_compliance",),
-    "msct": ("pressure",),
-    "mc": ("pressure_offset",),
-    "mswt": ("slice_load", "slice_pressure"),
-}
-"""Axes of the arrays of a cycle: gear, mesh, planet n, tooth pair (slot), cell, slice w, position t."""
-_BETWEEN = ("position", "deflection", "stiffness", "sun_arc", "load_share", "max_pressure", *_PRESSED)
-"""What is kept at the positions between."""
-_ODD = ("path", "back_path", "pressed_path", "tooth", "back_tooth", "pressure_offset", "pressure_centre")
-"""What counts the other way round in the mirror image."""
-
-
 def loaded_image(
     planetary_set: GearSet, sun_torque: float, deviations: SetDeviations | None = None
 ) -> tuple[GearSet, np.ndarray, SetDeviations | None]:
@@ -229,7 +219,7 @@ def walk_mesh_cycle(
         record = replace(record, **over_slices(record, options.ahead, periods=periods))
         pins = pin_forces(solved, record.force, record.back_force, record.friction_force)
         record = replace(record, bearing_force=pins)
-    return _seen_from_front(record, planetary_set, order) if mirrored else record
+    return seen_from_front(record, planetary_set, order) if mirrored else record
 
 
 def _under_load(
@@ -292,12 +282,12 @@ def cycle_without_load(
     kinds = {"tooth": int, "back_tooth": int, "iterations": int, "edge_contact": bool}
     values: dict[str, Any] = {
         name: np.zeros([size[axis] for axis in axes], kinds.get(name, float))
-        for axes, names in _AXES.items()
+        for axes, names in AXES.items()
         for name in names
         if not name.startswith("held")
         and (options.friction is not None or name not in FRICTION)
-        and (options.pressures or name not in _PRESSURES)
-        and (options.waves is not None or name not in _SLICED)
+        and (options.pressures or name not in PRESSURES)
+        and (options.waves is not None or name not in SLICED)
     }
     values["open_planets"] = np.ones((N, P), bool)
     values["member_tilt"] = None if options.waves is None else np.zeros((0, P))
@@ -469,7 +459,7 @@ class _Walk:
         if len(first) == len(again):
             return self._solved_in_place(share, nearest)
         record, wider, further = self._with(self.empty.position[first])._solved_in_place(share, nearest)
-        return None if record is None else _repeated_record(record, self.empty, again), wider, further
+        return None if record is None else repeated_record(record, self.empty, again), wider, further
 
     def _different(self, share: float, nearest: float) -> tuple[np.ndarray, np.ndarray]:
         """Positions in different states, and which of them all repeat, see `different_positions`."""
@@ -629,7 +619,7 @@ class _Walk:
         order = equidistant + np.argsort(curves["position"][equidistant:])
         looked = np.arange(self.planetary_set.n_planets) < self.planetary_set.n_planets // self.alike
         between = Between(
-            **{name: curves[name][..., order] for name in _BETWEEN},
+            **{name: curves[name][..., order] for name in BETWEEN},
             looked=looked,
             records=tuple(records),
             doubt=doubt,
@@ -674,7 +664,7 @@ class _Walk:
 
     def _curves(self, record: MeshCycle) -> dict[str, np.ndarray]:
         """What has peaks over the positions, and the tooth pairs that carry as `tooth_pair_codes`."""
-        pitch, curves = self.planetary_set.base_pitch, {n: np.asarray(getattr(record, n)) for n in _BETWEEN}
+        pitch, curves = self.planetary_set.base_pitch, {n: np.asarray(getattr(record, n)) for n in BETWEEN}
         for name, after in (("codes", 0.0), ("later_codes", float(self.empty.periods))):
             place = record.path, record.position + after
             curves[name] = tooth_pair_codes(place[0], record.tooth_load, place[1], pitch)
@@ -789,7 +779,7 @@ class _Walk:
         if self.options.pressures:
             values["pressure_offset"] = (np.arange(cells) + 0.5 - 0.5 * cells) * setup.cell[drive, None]
             values.setdefault("pressure_centre", _over_positions(setup.centre[drive], tau[0].size))
-        for axes, names in _AXES.items():
+        for axes, names in AXES.items():
             if axes[0] == "m" and axes[1] != "m":
                 names = (*names, "near") if axes == "mst" else names
                 values |= {name: values[name][every] for name in names if name in values}
@@ -836,7 +826,7 @@ class _Walk:
         assert pressed is not None
         return {
             name: np.take_along_axis(of_pairs, pressed[:, None], axis=1)[:, 0]
-            for name, of_pairs in zip(_PRESSED, (path, load), strict=True)
+            for name, of_pairs in zip(PRESSED, (path, load), strict=True)
         }
 
     def _with_all_pairs(self, values: dict, setup: MeshWindows, tau: np.ndarray) -> tuple[dict, Any, Any]:
@@ -860,7 +850,7 @@ class _Walk:
             wide["pressure_centre"] = _over_positions(setup.listed.centre, tau[0].size), slots[1]
         wide |= {
             name: (values[name], slots[0])
-            for axes, names in _AXES.items()
+            for axes, names in AXES.items()
             if axes[:2] == "ms"
             for name in names
             if name in values
@@ -877,7 +867,7 @@ class _Walk:
         values = dict(values)
         take = kept_pairs(values.pop("near").any(axis=-1))
         mesh = np.arange(len(take))[:, None]
-        for axes, names in _AXES.items():
+        for axes, names in AXES.items():
             for name in names if "s" in axes else ():
                 if name in values:
                     values[name] = values[name][:, mesh, take] if axes == "gms" else values[name][mesh, take]
@@ -901,8 +891,8 @@ class _Walk:
             planet = (np.arange(N) + turns * step) % N
             mesh = self.planetary_set.moved_meshes(planet)
             index_of = {"m": mesh, "n": planet}
-            slots = {back: _same_pairs(values[f"{back}path"], mesh, number * part, pitch) for back in ("", "back_")}
-            for axes, names in _AXES.items():
+            slots = {back: same_pairs(values[f"{back}path"], mesh, number * part, pitch) for back in ("", "back_")}
+            for axes, names in AXES.items():
                 names = (*names, "near") if axes == "mst" else names
                 over_positions = (name for name in names if axes[-1] == "t" and name in values)
                 for name in (name for name in over_positions if values[name].shape[-1] == part):
@@ -910,12 +900,14 @@ class _Walk:
                     for place, axis in enumerate(axes[:2]):
                         here = here.take(index_of[axis], axis=place) if axis in index_of else here
                     if axes[:2] == "ms":
-                        here = _in_slots(here, slots["back_" if name.startswith("back_") else ""])
+                        here = in_slots(here, slots["back_" if name.startswith("back_") else ""])
                     repeated[name].append(here)
             angle = -2.0 * math.pi * turns / self.turns
             moved = {"member_motion": self.members.names, "member_tilt": self._tilt_names}
             for name in (name for name in moved if name in values):
-                repeated[name].append(np.concatenate(_mapped(moved[name], values[name], planet, _turn(angle))))
+                repeated[name].append(
+                    np.concatenate(mapped_members(moved[name], values[name], planet, rotation_matrix(angle)))
+                )
         return {name: np.concatenate(parts, axis=-1) for name, parts in repeated.items() if parts}
 
 
@@ -927,62 +919,9 @@ def _pairs_near(setup: MeshWindows, meshes: int, slices: int) -> np.ndarray:
     return near.swapaxes(1, 2)
 
 
-def _repeated_record(record: MeshCycle, empty: MeshCycle, again: np.ndarray) -> MeshCycle:
-    """The record at all positions of an empty one, by those (P,) of the record whose states they repeat."""
-    over_positions = (name for axes, names in _AXES.items() if axes[-1] == "t" for name in names)
-    names = (*over_positions, "bearing_force", "member_motion", "member_tilt")
-    values = {name: values[..., again] for name in names if (values := getattr(record, name)) is not None}
-    return replace(record, position=empty.position, **values)
-
-
 def _over_positions(values: np.ndarray, slices: int) -> np.ndarray:
     """Values (M, T, P), means over slices, by those (M, P slices, T) of all slices one after the other."""
     return np.moveaxis(values.reshape(len(values), -1, slices, values.shape[2]).mean(axis=2), 2, 1)
-
-
-def _same_pairs(path: np.ndarray, mesh: np.ndarray, later: int, pitch: float) -> np.ndarray:
-    """Slots (M, T) of meshes ``mesh`` that hold the pairs of all meshes so many positions later.
-
-    Paths are (M, T, P) [m]; T where there is no such slot.
-    """
-    count = path.shape[1]
-    apart = (path[:, :1, later] - path[mesh, :1, 0]) / pitch
-    if count > 1:
-        apart *= np.sign(path[mesh, 1:2, 0] - path[mesh, :1, 0])
-    slot = np.arange(count) + np.rint(apart).astype(int)
-    return np.where((slot >= 0) & (slot < count), slot, count)
-
-
-def _in_slots(values: np.ndarray, slot: np.ndarray) -> np.ndarray:
-    """Values (M, T, ...) from the slots (M, T), zero where the slot is T."""
-    padded = np.concatenate([values, np.zeros_like(values[:, :1])], axis=1)
-    return padded[np.arange(len(values))[:, None], slot]
-
-
-def _mapped(
-    names: Sequence[str], values: np.ndarray, planet: np.ndarray, matrix: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
-    """Map vectors of members (m, P), named in pairs of x and y, by a matrix (2, 2), and give what follows.
-
-    Planet ``planet[i]`` of the values is planet i of what is found.
-    """
-    pairs = [name for name in names if name.endswith((": x", ": y"))][::2]
-    vectors, rest = np.split(values, [2 * len(pairs)])
-    turned_vectors = np.einsum("ij,mjp->mip", matrix, vectors.reshape(-1, 2, vectors.shape[1]))
-    planets = [i for i, name in enumerate(pairs) if name.startswith("planet")]
-    if planets:
-        turned_vectors[planets] = turned_vectors[planets][planet]
-    return turned_vectors.reshape(vectors.shape), rest
-
-
-def _turn(angle: float) -> np.ndarray:
-    """Rotation (2, 2) by an angle [rad]."""
-    return np.array([[math.cos(angle), -math.sin(angle)], [math.sin(angle), math.cos(angle)]])
-
-
-def _reflection(angle: float) -> np.ndarray:
-    """Reflection (2, 2) in the line at an angle [rad]."""
-    return _turn(2.0 * angle) * np.array([1.0, -1.0])
 
 
 def _between_meshes(setup: MeshWindows, tangents: np.ndarray, force: np.ndarray) -> np.ndarray:
@@ -1001,51 +940,3 @@ def _both_flanks(tangents: ContactTangents, images, meshes: int) -> np.ndarray:
     """Tangent stiffness of every mesh (M, P), both flanks together [N/m]."""
     of_images = tangents.of_meshes(images[0])
     return of_images.reshape(len(of_images), -1, meshes).sum(axis=1).T
-
-
-def _seen_from_front(cycle: MeshCycle, planetary_set: GearSet, order) -> MeshCycle:
-    """Results of the mirror image in the order of planets and positions of the original."""
-    planet, angle = np.argsort(order), planetary_set.planet_angles[0]
-    index_of: dict[str, Any] = {"m": planetary_set.moved_meshes(planet), "n": planet}
-    index_of["g"] = np.arange(2)
-    index_of["w"] = slice(None)
-    mirrored = {}
-    for name, axes in ((name, axes) for axes, names in _AXES.items() for name in names):
-        values = getattr(cycle, name)
-        if values is None:
-            continue
-        for number, axis in enumerate(axes):
-            # the pair that comes first along the path leaves first when the rotation is seen from behind
-            place = index_of[axis] if axis in index_of else slice(None, None, -1)
-            values = values[(slice(None),) * number + (place,)]
-        mirrored[name] = -values if name in _ODD else values
-    if cycle.between is not None:
-        between, mesh = cycle.between, index_of["m"]
-        mirrored["between"] = replace(
-            between,
-            position=0.0 - between.position[::-1],
-            deflection=between.deflection[mesh, ::-1],
-            stiffness=between.stiffness[mesh, ::-1],
-            sun_arc=between.sun_arc[::-1],
-            load_share=between.load_share[planet, ::-1],
-            max_pressure=between.max_pressure[mesh, ::-1],
-            pressed_path=-between.pressed_path[mesh, ::-1],
-            pressed_load=between.pressed_load[mesh, ::-1],
-            looked=between.looked[planet],
-            records=tuple(_seen_from_front(record, planetary_set, order) for record in between.records),
-        )
-    mirrored["member_motion"] = _in_mirror(cycle.member_names, cycle.member_motion, planet, angle)
-    if cycle.member_tilt is not None:
-        mirrored["member_tilt"] = _in_mirror(cycle.tilt_names, cycle.member_tilt, planet, angle)
-    return replace(
-        cycle,
-        position=0.0 - cycle.position[::-1],
-        bearing_force=np.einsum("ij,njp->nip", _reflection(angle), cycle.bearing_force)[planet][:, :, ::-1],
-        **mirrored,
-    )
-
-
-def _in_mirror(names: Sequence[str], values: np.ndarray, planet: np.ndarray, angle: float) -> np.ndarray:
-    """Vectors of members (m, P), and what turns them last, of the mirror image in the original's order."""
-    vectors, turned = _mapped(names, values, planet, _reflection(angle))
-    return np.concatenate([vectors, -turned])[:, ::-1]

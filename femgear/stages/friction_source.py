@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from femgear.contact.cycle import FRICTION
+from femgear.contact.mapped_cycle import FRICTION
 from femgear.report.tables import Marks, chosen
 
 if TYPE_CHECKING:
