@@ -6,10 +6,12 @@ It works in a process of its own (`femgear.app.worker`), which gives up an answe
 from __future__ import annotations
 
 import base64
+import gc
 import io
 import math
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -18,6 +20,7 @@ import numpy as np
 
 from femgear.app.document import tables_of_text
 from femgear.case.dependencies import Steps
+from femgear.case.sections import StaticSection
 from femgear.errors import CaseError, FemgearError, StorageError
 from femgear.exchange.formats import Sampling
 from femgear.findings import as_data, by_severity
@@ -33,6 +36,8 @@ from femgear.trains.shown import results_in_memory
 
 LISTENED = 2.0
 """Duration of the sound [s], whose end goes on with its beginning as well as whole turns let it."""
+DRAFT_POSITIONS = 24
+"""Positions of a mesh period, at most, of an answer that the next one may replace at once."""
 _HEADROOM = 4.0
 """Full scale of the sound over the largest sample of the first one: later ones may be louder."""
 
@@ -118,7 +123,6 @@ class Bench:
         place = np.array([[*body.axis, 0.5 * sum(body.ends)] for body in drawn])
         return space(drawn, members, place, ())
 
-    @one_blas_thread()
     def answer(
         self, text: str, name: str, shown: Sequence[str], stages: Sequence[str], seen: Mapping[str, int] = {}
     ) -> Iterator[dict[str, Any]]:
@@ -150,7 +154,27 @@ class Bench:
         Superseded
             A newer text waits.
         """
+        yield from self._parts(self._case(text, name), shown, stages, seen)
+
+    def draft(self, text: str, name: str, shown: Sequence[str], seen: Mapping[str, int] = {}) -> Iterator[dict]:
+        """Compute the static solution of a case at few positions, for the time until the whole answer is there.
+
+        Nothing where the whole solution is known, or the case has none. Arguments, parts and errors are those of
+        `answer`; every part has the number of ``positions`` besides.
+        """
         case = self._case(text, name)
+        static = getattr(case, "static", None)
+        if not isinstance(static, StaticSection) or not Answer(case, self._steps).unknown().get("static"):
+            return
+        few = {"positions": min(static.positions, DRAFT_POSITIONS), "peaks": False}
+        coarse = case.model_copy(update={"static": static.model_copy(update=few)})
+        for part in self._parts(coarse, shown, ["static"], seen):
+            yield part | {"positions": few["positions"]}
+
+    def _parts(
+        self, case: Any, shown: Sequence[str], stages: Sequence[str], seen: Mapping[str, int]
+    ) -> Iterator[dict[str, Any]]:
+        """Parts of an `answer` to a case."""
         check_case(case)
         train, of_run = train_of(case), {stage.name: stage for stage in stages_of(case)}
         answer = Answer(case, self._steps, cache=self._cache, progress=self._go_on)
@@ -159,28 +183,29 @@ class Bench:
         taken = {name for stage in wanted for name in stage.before(case)}
         # first what others go on from, then the quickest
         seconds = {stage.name: 0.0 if stage.name in taken else self._seconds.get(stage.name, 1.0) for stage in wanted}
-        for stage in (ordered := sorted(wanted, key=lambda stage: seconds[stage.name])):
-            self._go_on()
-            start = time.perf_counter()
-            computed[stage.name] = answer[stage.name]
-            results = results_in_memory(case, computed, self.folder)
-            number = self._number(stage.name, computed[stage.name])
-            same = seen.get(stage.name) == number
-            drawings = self._drawings(train, stage, results, computed, () if same else shown)
-            # what is there already is judged once, with the last stage
-            judged = not same or stage is ordered[-1]
-            sentence, judgements = train.summary(results) if judged else (None, ())
-            self._seconds[stage.name] = max(self._seconds.get(stage.name, 0.0), time.perf_counter() - start)
-            yield {
-                "stage": stage.name,
-                "seconds": time.perf_counter() - start,
-                "number": number,
-                "same": same,
-                **drawings,
-                "sentence": sentence,
-                "judgements": [asdict(judgement) | {"words": judgement.words} for judgement in judgements],
-                "findings": as_data(by_severity(results.findings)),
-            }
+        with _uncollected():
+            for stage in (ordered := sorted(wanted, key=lambda stage: seconds[stage.name])):
+                self._go_on()
+                start = time.perf_counter()
+                computed[stage.name] = answer[stage.name]
+                results = results_in_memory(case, computed, self.folder)
+                number = self._number(stage.name, computed[stage.name])
+                same = seen.get(stage.name) == number
+                drawings = self._drawings(train, stage, results, computed, () if same else shown)
+                # what is there already is judged once, with the last stage
+                judged = not same or stage is ordered[-1]
+                sentence, judgements = train.summary(results) if judged else (None, ())
+                self._seconds[stage.name] = max(self._seconds.get(stage.name, 0.0), time.perf_counter() - start)
+                yield {
+                    "stage": stage.name,
+                    "seconds": time.perf_counter() - start,
+                    "number": number,
+                    "same": same,
+                    **drawings,
+                    "sentence": sentence,
+                    "judgements": [asdict(judgement) | {"words": judgement.words} for judgement in judgements],
+                    "findings": as_data(by_severity(results.findings)),
+                }
 
     def sound(self, text: str, file: str) -> dict[str, Any] | None:
         """Sample what the first sensor of a case hears at its first speed; None where there is nothing to hear.
@@ -257,6 +282,18 @@ class Bench:
         charts = {key: chart(figure) or {"png": _picture(figure)} for key, figure in figures_of.items()}
         there = [name for name in names if any(key == name or key.startswith(f"{name}_") for key in drawn)]
         return {"charts": charts, "names": there, "captions": {key: caption_of(train, key)[2] for key in charts}}
+
+
+@contextmanager
+def _uncollected() -> Iterator[None]:
+    """Leave garbage where it is: looking for it takes a quarter of an answer, as figures are full of cycles."""
+    collects = gc.isenabled()
+    gc.disable()
+    try:
+        yield
+    finally:
+        if collects:
+            gc.enable()
 
 
 def _picture(figure: Any) -> str:

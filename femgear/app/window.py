@@ -6,7 +6,7 @@ import asyncio
 import json
 import tempfile
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import cache, partial
 from itertools import count
@@ -114,6 +114,8 @@ class Window:
         self._drawn = dict[str, int]()
         self._charts_chosen = list[str]()
         self._charts_offered = list[str]()
+        # whether a slider made the latest change
+        self._dragged = False
         self._ready = False
         self._outbox: list[dict[str, Any]] = []
 
@@ -378,6 +380,7 @@ class Window:
         def drag(event: events.GenericEventArguments) -> None:
             value = slider.entry_value(float(event.args))
             shown.text = shown_value(value)
+            self._dragged = True
             self._change_entry(slider.key, value)
 
         moved.on("update:model-value", drag, throttle=0.05, leading_events=True)
@@ -420,16 +423,17 @@ class Window:
                 await self._changed.wait()
                 self._changed.clear()
                 text, name = self.session.text, self.session.name
+                dragged, self._dragged = self._dragged, False
                 if not name:
                     continue
                 try:
-                    await self._answer(text, name)
+                    await self._answer(text, name, dragged)
                 except WorkerError as error:
                     self._drawn.clear()  # another process numbers its results anew
                     self._send([{"what": "end", "text": str(error)}])
 
-    async def _answer(self, text: str, name: str) -> None:
-        """Look at a text, and compute what it can answer."""
+    async def _answer(self, text: str, name: str, dragged: bool) -> None:
+        """Look at a text, and compute what it can answer: of one that a slider makes first a draft."""
         start = time.perf_counter()
         async for seen in self._bench.ask("look", text, name):
             if name == self.session.name:
@@ -443,12 +447,15 @@ class Window:
         if not self._gears:
             await self._show_gears(text, name)
         shown, stages = list(self._charts.value or ()), [stage["name"] for stage in self._seen["stages"]]
+        drafted = dragged and await self._draft(text, name, shown)
+        if self._changed.is_set() and drafted:
+            return
         parts = self._bench.ask("answer", text, name, shown, stages, dict(self._drawn))
         drawn = False
 
         def superseded() -> bool:
             """Whether something changed, and this answer has had its time."""
-            patience = _DRAGGED if drawn else _LONGEST
+            patience = 0.0 if drafted else _DRAGGED if drawn else _LONGEST
             return self._changed.is_set() and time.perf_counter() - start > patience
 
         while (part := await self._next(parts, superseded)) is not None:
@@ -459,6 +466,17 @@ class Window:
         if self._changed.is_set():
             return
         await self._rest(text, name, start)
+
+    async def _draft(self, text: str, name: str, shown: Sequence[str]) -> bool:
+        """Show what few positions say, which counts until the whole answer is there; tells whether there was need."""
+        drafted = False
+        async for part in self._bench.ask("draft", text, name, shown, dict(self._drawn)):
+            if name != self.session.name:
+                return True
+            self._show_part(part)
+            self._send([{"what": "draft", "positions": part["positions"]}])
+            drafted = True
+        return drafted
 
     async def _rest(self, text: str, name: str, start: float) -> None:
         """Let the case be heard and describe it, once all numbers are there."""

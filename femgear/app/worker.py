@@ -157,7 +157,7 @@ class Requests:
 
 
 def serve_bench(pipe: Connection, folder: Path, cache: Path | None) -> None:
-    """Answer for a case in a folder: `Bench.look`, `tables`, `gears`, `answer` and `sound`."""
+    """Answer for a case in a folder: `Bench.look`, `tables`, `gears`, `draft`, `answer` and `sound`."""
     bench = Bench(folder, cache=cache, waiting=pipe.poll)
-    names = "look", "tables", "gears", "answer", "sound"
+    names = "look", "tables", "gears", "draft", "answer", "sound"
     Requests(pipe).answer({name: getattr(bench, name) for name in names})

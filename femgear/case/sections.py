@@ -366,6 +366,7 @@ class StaticSection(Section):
     """Positions over one mesh period, contact search and grid."""
 
     positions: Annotated[int, Count(8, 4096)] = 64
+    peaks: StrictBool = True
     contact: Literal["profile", "line_of_action"] = "profile"
     flank_elements: Annotated[int, Count(4, 200)] = 24
     members: Literal["fixed", "elastic"] = "fixed"

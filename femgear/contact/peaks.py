@@ -105,14 +105,20 @@ def pitch_passages(path: np.ndarray, position: np.ndarray, base_pitch: float) ->
     return np.floor(path[:, 0] / base_pitch - place).astype(np.int64)
 
 
-def peak_doubt(position: np.ndarray, values: np.ndarray, least: np.ndarray, periods: int) -> float:
+def peak_doubt(
+    position: np.ndarray,
+    values: np.ndarray,
+    least: np.ndarray,
+    periods: int,
+    other: np.ndarray | None = None,
+) -> float:
     """Find the largest share of a peak to peak that curves may rise beyond their positions.
 
-    Positions (P,), values (K, P) and least sizes (K,) are those of `open_places`, of curves whose tooth pairs are not
-    looked at.
+    Positions (P,), values (K, P) and least sizes (K,) are those of `open_places`. ``other`` (P,) tells behind which
+    positions tooth pairs come or go; None where they are not looked at.
     """
     none = np.zeros(values.shape, bool)
-    beyond, _ = _beyond(position, values, none, none, least, periods)
+    beyond, _ = _beyond(position, values, none if other is None else none | other, none, least, periods)
     return float(beyond.max(initial=0.0))
 
 

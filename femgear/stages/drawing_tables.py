@@ -166,6 +166,8 @@ def drawing_attributes(case: GearCase) -> dict[str, Any]:
     drawn, kinds = drawn_gears(case), planetary_set(case).kinds
     names = [f"{pair.gear_1.name}_{pair.gear_2.name}" for pair in kinds]
     plays = dict(zip(names, mesh_plays(case), strict=True))
+    # (gears, 3): as computed, least, largest
+    measures = {name: np.array([getattr(d, name) for d in drawn]) for name in ("thickness", "span", "over_balls")}
     return {
         "drawing_gears": ", ".join(drawn_gear.gear.name for drawn_gear in drawn),
         "profile_shift": np.array([d.gear.profile_shift / math.cos(d.helix) for d in drawn]),
@@ -173,8 +175,8 @@ def drawing_attributes(case: GearCase) -> dict[str, Any]:
         "span_teeth": np.array([d.span_teeth or 0 for d in drawn]),
         "ball_diameter": np.array([math.nan if d.ball is None else d.ball for d in drawn]),
         **{
-            f"{'tooth_' * (name == 'thickness')}{name}{limit}": np.array([getattr(d, name)[number] for d in drawn])
-            for name in ("thickness", "span", "over_balls")
+            f"{'tooth_' * (name == 'thickness')}{name}{limit}": limits[:, number]
+            for name, limits in measures.items()
             for number, limit in enumerate(("", "_least", "_largest"))
         },
         **{f"normal_play_{name}": np.array([play.normal for play in limits]) for name, limits in plays.items()},

@@ -153,7 +153,7 @@ def solve_static(
         both_flanks=case.static.back_flanks,
         # pressures of the plane contact are not those of slices
         pressures=case.static.stresses and periods == 1 and case.static.slices < 2,
-        peaks=True,
+        peaks=case.static.peaks,
         friction=acting_friction(case, gears),
         progress=partial(progress, "contact"),
         **width,

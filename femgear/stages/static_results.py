@@ -24,7 +24,7 @@ from femgear.case.sections import face_width, gear_material
 from femgear.case.teeth import case_overlap
 from femgear.case.tooth_friction import friction_findings
 from femgear.contact.bodies import flank_widths
-from femgear.contact.peaks import FEWEST, peak_doubt
+from femgear.contact.peaks import FEWEST, peak_doubt, tooth_pair_codes
 from femgear.contact.root_stress import BACK, LOADED, NOTCH_REACH, RootCycle
 from femgear.contact.slices import PARTS as SLICES
 from femgear.findings import Finding, findings_in
@@ -363,7 +363,7 @@ class StaticResult(StageResult):
                 **self.drawing,
                 "contact": cycle.contact,
                 "mesh_periods": cycle.periods,
-                **({} if cycle.between is None else {"peak_doubt": cycle.between.doubt}),
+                **self._doubt(),
                 "period": self.period_message,
                 "peaks_cut_off": self._cut_off(),
                 "pressure_cells": cycle.unknowns,
@@ -391,6 +391,21 @@ class StaticResult(StageResult):
             peaks["ste_overall_between"] = planets[:, None] * between.sun_arc
             peaks["mesh_stiffness_between"] = between.stiffness
         return peaks
+
+    def _doubt(self) -> dict[str, float]:
+        """Attribute peak_doubt: what the search for peaks has left, without one what spur curves show at positions."""
+        cycle = self.cycle
+        if cycle.between is not None:
+            return {"peak_doubt": cycle.between.doubt}
+        if cycle.helical or not cycle.force.any():
+            return {}
+        curves, pitch = np.concatenate([cycle.deflection, cycle.stiffness]), self.planetary_set.base_pitch
+        codes, later = (
+            tooth_pair_codes(cycle.path, cycle.tooth_load, cycle.position + after, pitch)
+            for after in (0.0, float(cycle.periods))
+        )
+        other = (codes != np.column_stack([codes[:, 1:], later[:, 0]])).any(axis=0)
+        return {"peak_doubt": _doubt_of_curves(cycle.position, curves, cycle.periods, other)}
 
     def _cut_off(self) -> float:
         """Find the largest share that equidistant positions cut off a transmission error's peak to peak."""
@@ -924,9 +939,18 @@ def _peak_doubt(data: xr.Dataset) -> float:
         return float(data.attrs.get("peak_doubt", 0.0))
     curves = [data[name].values for name in ("ste", "mesh_stiffness")]
     values = np.concatenate([curve.reshape(-1, curve.shape[-1]) for curve in curves])
+    return _doubt_of_curves(data["position"].values, values, int(data.attrs["mesh_periods"]))
+
+
+def _doubt_of_curves(
+    position: np.ndarray, values: np.ndarray, periods: int, other: np.ndarray | None = None
+) -> float:
+    """Find the share of a peak to peak by which curves (K, P) may rise between equidistant positions (P,).
+
+    ``other`` (P,) tells behind which of them other tooth pairs carry, where that is known.
+    """
     least = 1e-3 * np.abs(values).max(axis=-1, initial=0.0)
-    position, periods = data["position"].values, int(data.attrs["mesh_periods"])
-    doubt = peak_doubt(position, values, least, periods)
+    doubt = peak_doubt(position, values, least, periods, other)
     if len(position) > FEWEST * periods:
         return doubt
     # slopes between so few do not show narrow peaks: what every other position misses

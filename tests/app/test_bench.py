@@ -8,10 +8,11 @@ import numpy as np
 import pytest
 from scipy.io import wavfile
 
-from femgear.app.bench import Bench, Superseded
+from femgear.app.bench import DRAFT_POSITIONS, Bench, Superseded
 from femgear.errors import CaseError
 from femgear.run import solve
-from femgear.trains.reading import parse_case
+from femgear.stages.static import solve_static
+from femgear.trains.reading import parse_case, with_values
 from femgear.trains.registry import train_of
 
 CASES = Path(__file__).parents[2] / "cases"
@@ -117,6 +118,26 @@ def test_what_did_not_change_is_neither_computed_nor_drawn_again(answered):
     assert next(iter(parts)) == "static", "what others go on from comes first"
     again = next(bench.answer(damped, "a.toml", ["mesh_stiffness"], ["static"]))
     assert [*again["charts"]] == ["mesh_stiffness"], "another chart is drawn of what is known"
+
+
+def test_a_slider_has_a_draft_of_few_positions_before_the_whole_answer(tmp_path):
+    bench, shown = Bench(tmp_path, cache=CACHE), ["static_transmission_error"]
+    text = TEXT.replace("positions = 8", "positions = 40")
+    (draft,) = bench.draft(text, "a.toml", shown)
+    assert draft["stage"] == "static" and draft["positions"] == DRAFT_POSITIONS
+
+    def errors(part):
+        return part["charts"]["static_transmission_error"]["panels"][0]["traces"][0]["y"]
+
+    few = solve_static(with_values(parse_case(text), {"static.positions": DRAFT_POSITIONS, "static.peaks": False}))
+    assert errors(draft)[:DRAFT_POSITIONS] == pytest.approx(1e6 * few.cycle.deflection[0], abs=1e-4)
+    (whole,) = bench.answer(text, "a.toml", shown, ["static"], {"static": draft["number"]})
+    fresh = solve_static(parse_case(text)).cycle
+    assert not whole["same"] and len(errors(whole)) == 40 + len(fresh.between.position) + 1
+    assert bench._latest["static"][0].cycle.peak_to_peak() == pytest.approx(fresh.peak_to_peak(), rel=1e-12)
+    assert [*bench.draft(text + "# a remark\n", "a.toml", shown)] == [], "what is known needs no draft"
+    faster = text.replace("1000 rpm", "1100 rpm")
+    assert [*bench.draft(faster, "a.toml", shown)] == [], "a speed leaves the contact as it is"
 
 
 def test_a_newer_text_ends_an_answer(tmp_path):

@@ -20,7 +20,7 @@ from femgear.stages import static as static_stages
 from femgear.stages.static import relief_kinks, solve_static, solve_stress
 from femgear.stages.static_results import _peak_doubt, describe_set, describe_stress, stress_warnings
 from femgear.stages.strength import nominal_stresses
-from femgear.trains.reading import read_case, with_value
+from femgear.trains.reading import read_case, with_value, with_values
 from validation.reference.root_stress import set_root_stress
 
 FILE = Path(__file__).parents[2] / "cases" / "planetary_27_40_108.toml"
@@ -461,6 +461,17 @@ def test_the_doubt_of_few_positions_covers_what_they_miss(count):
 def test_spur_teeth_have_the_doubt_of_their_search_for_peaks():
     assert _peak_doubt(record(16, overlap=0.0, peak_doubt=0.004)) == 0.004
     assert _peak_doubt(record(16, overlap=0.0)) == 0.0
+
+
+@pytest.mark.parametrize("count", (16, 24, 64))
+def test_a_record_without_a_search_tells_what_it_may_miss(count):
+    changes = {"static.flank_elements": 4, "static.stresses": False}
+    case = with_values(read_case(FILE.with_name("spur_pair.toml")), changes)
+    searched = solve_static(case).dataset()
+    data = solve_static(with_values(case, {"static.peaks": False, "static.positions": count})).dataset()
+    assert "between" not in data.dims
+    missed = 1.0 - data.ste_peak_to_peak.values / searched.ste_peak_to_peak.values
+    assert (missed > -1e-9).all() and data.attrs["peak_doubt"] > 0.5 * missed.max()
 
 
 # Tables of phasing and of neighbouring teeth for the terminal and the report.

@@ -164,6 +164,7 @@ CHANGES: tuple[dict[str, object], ...] = (
     {"operation.speeds": ["900 rpm", "2000 rpm"]},
     {"operation.speeds": ["900 rpm", "9000 rpm"], "dynamics.up_to": "40 kHz"},
     {"static.positions": 9, "static.longest_record": 50},
+    {"static.peaks": False},
     {"static.contact": "line_of_action"},
     {"static.flank_elements": 5},
     {"static.members": "elastic"},

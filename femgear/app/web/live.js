@@ -16,6 +16,9 @@ live.begin = () => {
   live.at("cards").classList.add("former");
   live.at("state").textContent = "computing";
 };
+live.draft = ({ positions }) => {
+  live.at("state").textContent = `draft while a slider moves: ${positions} positions, peaks between them are cut off`;
+};
 live.end = ({ seconds, text }) => {
   live.at("state").textContent = text || `computed in ${seconds.toFixed(2)} s`;
   if (!text) live.at("cards").classList.remove("former");
@@ -124,7 +127,7 @@ page.parts.push(() => {
   addEventListener("message", (event) => {
     if (event.source !== parent || event.origin !== location.origin) return;
     const { what, ...given } = event.data;
-    if (["begin", "end", "judge", "draw", "fresh", "keep", "space", "tables", "clear"].includes(what)) live[what](given);
+    if (["begin", "draft", "end", "judge", "draw", "fresh", "keep", "space", "tables", "clear"].includes(what)) live[what](given);
   });
   parent.postMessage({ femgear: "ready" }, location.origin);
 });
