@@ -56,7 +56,9 @@ _COMPARED = {
     *("housing.level_limit", "housing.microphone.level_limit"),
 }
 """What results are compared with, and whether others are computed to compare."""
-_SOLUTION = {f"static.{name}" for name in ("positions", "peaks", "contact", "back_flanks", "stresses", "longest_record")}
+_SOLUTION = {
+    f"static.{name}" for name in ("positions", "peaks", "contact", "back_flanks", "stresses", "longest_record")
+}
 """How the contact is solved, whatever the grids."""
 _BESIDE = {
     "deflection": {"modes", "dynamics", "runup", "balance", "transient"},

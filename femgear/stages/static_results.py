@@ -942,9 +942,7 @@ def _peak_doubt(data: xr.Dataset) -> float:
     return _doubt_of_curves(data["position"].values, values, int(data.attrs["mesh_periods"]))
 
 
-def _doubt_of_curves(
-    position: np.ndarray, values: np.ndarray, periods: int, other: np.ndarray | None = None
-) -> float:
+def _doubt_of_curves(position: np.ndarray, values: np.ndarray, periods: int, other: np.ndarray | None = None) -> float:
     """Find the share of a peak to peak by which curves (K, P) may rise between equidistant positions (P,).
 
     ``other`` (P,) tells behind which of them other tooth pairs carry, where that is known.
