@@ -26,7 +26,7 @@ A pair is the case without planets: one mesh, n = 0.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -75,6 +75,32 @@ class RubbingPoints(ReadOnlyArrays):
 
     def __len__(self) -> int:
         return len(self.shape)
+
+
+@dataclass(frozen=True)
+class PlanetMotions:
+    """Motions of a planet, all of them or some that know nothing of the others.
+
+    Parameters
+    ----------
+    ways : (p, n) array
+        Unit vectors of the motions along the axes of the planet [1].
+    mass, gyroscopic, turning : (n, n) arrays
+        Of them, as of `RunningStage`.
+    elastic : (n, n) array or None
+        Stiffness between them [N/m, N, N m/rad].
+    """
+
+    ways: np.ndarray
+    mass: np.ndarray
+    gyroscopic: np.ndarray
+    turning: np.ndarray
+    elastic: np.ndarray | None
+
+    def part(self, ways: np.ndarray) -> PlanetMotions:
+        """Take some of the motions, ways (p, n)."""
+        matrices = (self.mass, self.gyroscopic, self.turning, self.elastic)
+        return PlanetMotions(ways, *(None if own is None else ways.conj().T @ own @ ways for own in matrices))  # type: ignore[arg-type]
 
 
 @dataclass(frozen=True)
@@ -209,8 +235,13 @@ class RunningStage(ReadOnlyArrays):
         return np.where(rigid, 0.0, 1.0 / stiffness)
 
     @cached_property
-    def independent_motions(self) -> tuple[np.ndarray, ...]:
-        """Unit vectors (p, n) of the motions of a planet whose inertia and stiffness know nothing of the others.
+    def planet_motions(self) -> PlanetMotions:
+        """All motions of a planet along their axes."""
+        return PlanetMotions(np.eye(len(self.mass)), self.mass, self.gyroscopic, self.turning, self.elastic)
+
+    @cached_property
+    def independent_motions(self) -> tuple[PlanetMotions, ...]:
+        """Motions of a planet whose inertia and stiffness know nothing of the others.
 
         Whirls forwards and backwards of round shafts, their axial motions and rotations, and planets of a branch.
         """
@@ -225,28 +256,24 @@ class RunningStage(ReadOnlyArrays):
                 largest = np.sqrt(effect.max(axis=1, initial=0.0))
                 coupled |= effect > _INDEPENDENT * np.outer(largest, largest)
         sets = connected_sets([np.flatnonzero(row) for row in coupled | coupled.T])
-        return tuple(whirls[:, sorted(members)] for members in sets)
+        return tuple(self.planet_motions.part(whirls[:, sorted(members)]) for members in sets)
 
     def planet_stiffness(
-        self, omega: np.ndarray, mesh_frequency: float, speed: float, motions: np.ndarray | None = None
+        self, omega: np.ndarray, mesh_frequency: float, speed: float, motions: PlanetMotions | None = None
     ) -> np.ndarray:
-        """Dynamic stiffness (..., p, p) of a planet at angular frequencies (...) in the frame of the carrier.
+        """Dynamic stiffness (..., n, n) of a planet at angular frequencies (...) in the frame of the carrier.
 
-        ``speed`` is that of the carrier, positive for its sense [rad/s]; ``motions`` (p, n) are some of its motions,
-        whose stiffness (..., n, n) alone is wanted.
+        ``speed`` is that of the carrier, positive for its sense [rad/s]; ``motions`` by default all of them.
         """
-        omega = np.asarray(omega)[..., None, None]
-        # powers of i omega in M (d/dt + s Omega S)^2 + G (d/dt + s Omega S): one product each for all frequencies
-        turning, spinning = self.sense * speed * self.turning, mesh_frequency * self.gyroscopic
-        still = self.mass @ turning @ turning + spinning @ turning
-        first, mass, elastic = 2.0 * self.mass @ turning + spinning, self.mass, self.elastic
-        if motions is not None:
-            still, first, mass = (motions.conj().T @ matrix @ motions for matrix in (still, first, mass))
-            elastic = None if elastic is None else motions.conj().T @ elastic @ motions
-        inertial = still + 1j * omega * first - omega**2 * mass
-        if elastic is None:
-            return inertial
-        return inertial + elastic * (1.0 + 1j * self.structure_loss * np.sign(omega))
+        planet, omega = motions or self.planet_motions, np.asarray(omega, float)
+        M, T, spinning = planet.mass, self.sense * speed * planet.turning, mesh_frequency * planet.gyroscopic
+        # powers of i omega in M (d/dt + s Omega S)^2 + G (d/dt + s Omega S), then the springs and their loss
+        matrices, powers = [M @ T @ T + spinning @ T, 2.0 * M @ T + spinning, M], [omega**0, 1j * omega, -(omega**2)]
+        if planet.elastic is not None:
+            matrices.append(planet.elastic)
+            powers.append(1.0 + 1j * self.structure_loss * np.sign(omega))
+        dynamic = np.stack(powers, axis=-1) @ np.stack(matrices).astype(complex).reshape(len(matrices), -1)
+        return dynamic.reshape(*omega.shape, *M.shape)
 
     def shared(self, whole: np.ndarray, omega: np.ndarray) -> np.ndarray:
         """Compliances (..., G, C, G, C) by bodies in common at whole orders (...) and frequencies [m/N].
@@ -358,8 +385,32 @@ def solve_running(
     cycles : int
         Of GMRES.
     """
-    problem = _Problem(stage, harmonics, side_bands)
-    return problem.solve(mesh_frequency, carrier_speed, tolerance, cycles)
+    known = {"harmonics": harmonics, "side_bands": side_bands, "tolerance": tolerance, "cycles": cycles}
+    return solve_excitations((stage,), mesh_frequency, carrier_speed, **known)[0]
+
+
+def solve_excitations(
+    stages: Sequence[RunningStage],
+    mesh_frequency: float,
+    carrier_speed: float,
+    *,
+    harmonics: tuple[int, int],
+    side_bands: int | None = None,
+    tolerance: float = 1e-10,
+    cycles: int = CYCLES,
+) -> list[RunningResponse]:
+    """Solve for the responses of stages that differ in their excitation alone: what moves is solved once.
+
+    Parameters
+    ----------
+    stages : sequence of RunningStage
+        Of equal motions, springs, periods of the excitation and paths.
+    mesh_frequency, carrier_speed, harmonics, side_bands, tolerance, cycles
+        As of `solve_running`, which says what is refused.
+    """
+    problems = [_Problem(stage, harmonics, side_bands) for stage in stages]
+    parts = list(problems[0].parts(mesh_frequency, carrier_speed))
+    return [problem.solve(parts, mesh_frequency, carrier_speed, tolerance, cycles) for problem in problems]
 
 
 @dataclass(frozen=True)
@@ -476,10 +527,15 @@ def _planet_equations(stage: RunningStage, omega: np.ndarray, mesh_frequency: fl
         return _PlanetEquations(np.arange(b), compliance, rows, columns, dynamic)
     # motions that nothing bends have no stiffness at rest, be it in the frame of the carrier or in that of the casing
     still = (np.abs(omega) <= 1.5 * speed).any(axis=0)
-    for motions in stage.independent_motions:
+    for motions in stage.independent_motions if not still.all() else ():
         moving = stage.planet_stiffness(omega[:, ~still], mesh_frequency, speed, motions)
-        right = np.broadcast_to(motions.conj().T @ pushed, (*moving.shape[:3], pushed.shape[1]))
-        compliance[:, ~still] += (stage.approach.T @ motions) @ np.linalg.solve(moving, right)
+        right = np.broadcast_to(motions.ways.conj().T @ pushed, (*moving.shape[:3], pushed.shape[1]))
+        compliance[:, ~still] += (stage.approach.T @ motions.ways) @ np.linalg.solve(moving, right)
+    if not still.any():
+        rows, columns, dynamic = (
+            np.zeros((count, 0, *shape)) for shape in (pushed.shape, stage.approach.T.shape, 2 * [len(stage.mass)])
+        )
+        return _PlanetEquations(np.flatnonzero(still), compliance, rows, columns, dynamic)
     rigid, bent = stage.rigid_and_bent
     dynamic = stage.planet_stiffness(omega[:, still], mesh_frequency, speed)
     kept, gone = dynamic @ rigid, dynamic @ bent
@@ -547,10 +603,11 @@ class _Problem:
         owner = np.concatenate([point * G + group for point in range(max(points, 1))])
         return MeshFluctuation(alone, orders, owner, turns).of_leaders(friction) if points else friction
 
-    def solve(self, mesh_frequency: float, speed: float, tolerance: float, cycles: int) -> RunningResponse:
-        """Solve at a mesh frequency and a speed of the carrier [rad/s]."""
+    def solve(
+        self, parts: Sequence[_Part], mesh_frequency: float, speed: float, tolerance: float, cycles: int
+    ) -> RunningResponse:
+        """Solve at a mesh frequency and a speed of the carrier [rad/s], by the `parts` there."""
         orders, shape = self.orders, self.source.shape
-        parts = list(self._parts(mesh_frequency, speed))
         line = np.tile(np.arange(orders.lines + 1), orders.patterns) / orders.periods
         omega = line[:, None] * mesh_frequency + orders.bands * speed
         omega[np.abs(omega) < _STILL * mesh_frequency] = 0.0
@@ -601,7 +658,7 @@ class _Problem:
             used = [k for k, places in enumerate(reached) if np.isin(places, bands).any()]
             yield bands, structure_bands[used]
 
-    def _parts(self, mesh_frequency: float, speed: float) -> Iterator[_Part]:
+    def parts(self, mesh_frequency: float, speed: float) -> Iterator[_Part]:
         """Solve all blocks for unit forces e beyond k0."""
         orders, stage = self.orders, self.stage
         G, C, p = len(self.leaders), len(stage.stiffness), len(stage.mass)

@@ -23,7 +23,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from femgear.case.dependencies import Steps
-from femgear.housing.two_way.running_planets import RunningResponse, ring_lines, solve_running
+from femgear.housing.two_way.running_planets import RunningResponse, ring_lines, solve_excitations
 from femgear.report.tables import merged_names
 from femgear.stages.protocol import Progress, silent
 from femgear.system.system import MeshExcitation
@@ -35,7 +35,7 @@ from femgear.trains.gearbox.model import GearboxModel, StageModel, reference_sha
 from femgear.trains.gearbox.paths import CasingPaths, casing_paths, forces_on_casing
 from femgear.trains.gearbox.planet_branches import running_sets
 from femgear.trains.gearbox.planet_shafts import pair_phases
-from femgear.trains.gearbox.running_branches import BranchForces, branch_stage
+from femgear.trains.gearbox.running_branches import BranchForces, branch_kinds, kinds_together
 from femgear.trains.gearbox.sensors import gearbox_sensors, sensor_rows
 from femgear.trains.gearbox.stage_structure import StructuredStage, running_stage
 
@@ -251,19 +251,27 @@ def solve_gearbox_response(
     lines, staged, phases = list[StageLines](), exciting_stages(found), pair_phases(case, model.flow)
     excitations = {one.name: excitation_of(found, one, rings, steps=steps, friction=friction) for one in staged}
     parts = [*_exciting_parts(found, staged, excitations, phases, rings)]
-    for done, part in enumerate(parts, start=1):
-        outputs = np.vstack([rows, mesh_rows(model, part.running_meshes)])
-        outputs[len(sensors) + part.running_rows] = 0.0
-        at_sensors = part.structured.at_sensors(rows[: len(sensors)], sensors)
-        outputs = np.vstack([at_sensors, outputs[len(sensors) :] @ part.structured.motion])
-        lines.append(_stage_lines(found, part, outputs, speeds / nominal, paths))
+    for done, together in enumerate(parts, start=1):
+        outputs = [_outputs(model, part, rows, len(sensors)) for part in together]
+        lines += _stage_lines(found, together, outputs, speeds / nominal, paths)
         progress(stage, done, len(parts))
     missing = tuple(one.name for one in model.stages if one not in staged)
     # what runs around has the phases of its teeth
-    alone = {part.name: phases.get(part.name, 0.0) for part in parts if part.forces is None}
+    alone = {part.name: phases.get(part.name, 0.0) for (part, *_) in parts if part.forces is None}
     lines = _in_phase(lines, alone)
     names = () if paths is None else paths.names
     return GearboxResponse(found, reference, speeds, tuple(lines), missing, up_to, names)
+
+
+def _outputs(model: GearboxModel, part: _ExcitingPart, rows: np.ndarray, sensors: int) -> np.ndarray:
+    """Outputs (k, m) per unit of a mode of the structure of a part, the last ones approaches of meshes.
+
+    ``rows`` (k, 6n) are those of `output_rows`, the first ones of so many sensors.
+    """
+    outputs = np.vstack([rows, mesh_rows(model, part.running_meshes)])
+    outputs[sensors + part.running_rows] = 0.0
+    at_sensors = part.structured.at_sensors(rows[:sensors], gearbox_sensors(model.case))
+    return np.vstack([at_sensors, outputs[sensors:] @ part.structured.motion])
 
 
 def _in_phase(lines: Sequence[StageLines], phases: Mapping[str, float]) -> list[StageLines]:
@@ -325,21 +333,31 @@ def _exciting_parts(
     excitations: Mapping[str, MeshExcitation],
     phases: Mapping[str, float],
     rings: Sequence[ElasticRing],
-) -> Iterator[_ExcitingPart]:
-    """Take what excites a gearbox out of it, part by part."""
+) -> Iterator[list[_ExcitingPart]]:
+    """Take what excites a gearbox out of it; parts that differ in their excitation alone stand together."""
     stages, done = {stage.name: stage for stage in staged}, set[str]()
     for running in running_sets(found.model.case):
-        for kind, names in enumerate(running.kinds):
-            own = tuple(stage for stage in found.model.stages if stage.name in names)
-            if stages.keys().isdisjoint(names):
-                continue
-            structured, forces = branch_stage(found, running, kind, excitations, phases, rings)
-            done |= {*names}
-            yield _ExcitingPart(merged_names(names), own, structured, forces)
+        left = [kind for kind, names in enumerate(running.kinds) if not stages.keys().isdisjoint(names)]
+        while left:
+            together = kinds_together(found.model, running, left[0])
+            kinds = [kind for kind in left if kind in together]
+            left = [kind for kind in left if kind not in together]
+            for group in branch_kinds(found, running, kinds, excitations, phases, rings):
+                names = [running.kinds[together[forces.own.start]] for _, forces in group]
+                yield [_kind_part(found.model, own, *made) for own, made in zip(names, group, strict=True)]
+            done |= {name for kind in kinds for name in running.kinds[kind]}
     for stage in staged:
         if stage.name not in done:
             structured = running_stage(found, stage, excitations[stage.name], rings)
-            yield _ExcitingPart(stage.name, (stage,), structured)
+            yield [_ExcitingPart(stage.name, (stage,), structured)]
+
+
+def _kind_part(
+    model: GearboxModel, names: Collection[str], structured: StructuredStage, forces: BranchForces
+) -> _ExcitingPart:
+    """One kind of meshes, of these names, of planets that are shafts."""
+    own = tuple(stage for stage in model.stages if stage.name in names)
+    return _ExcitingPart(merged_names([*names]), own, structured, forces)
 
 
 def mesh_rows(model: GearboxModel, meshes: Collection[int]) -> np.ndarray:
@@ -353,70 +371,130 @@ def mesh_rows(model: GearboxModel, meshes: Collection[int]) -> np.ndarray:
 
 
 def _stage_lines(
-    found: Deflection, part: _ExcitingPart, outputs: np.ndarray, factors: np.ndarray, paths: CasingPaths | None
-) -> StageLines:
-    """Lines of one stage at all speeds, of outputs (k, m) per unit of a mode, the last ones approaches of meshes."""
-    model, stage, running = found.model, part.stages[0], part.structured.running
-    measured, up_to = len(outputs) - len(model.assembly.contacts), model.case.dynamics.up_to
+    found: Deflection,
+    parts: Sequence[_ExcitingPart],
+    outputs: Sequence[np.ndarray],
+    factors: np.ndarray,
+    paths: CasingPaths | None,
+) -> list[StageLines]:
+    """Lines at all speeds of parts that differ in their excitation alone.
+
+    Of outputs (k, m) of each per unit of a mode of the structure, the last ones approaches of meshes.
+    """
+    model, first = found.model, parts[0]
+    stage, dynamics = first.stages[0], model.case.dynamics
     mesh = 2.0 * math.pi * model.flow.mesh_frequency[stage.name]
-    carrier = _carrier_speed(model, stage) if part.structured.orbit is not None else 0.0
-    most = model.case.dynamics.mesh_harmonics or _MOST
-    counts = np.clip(np.floor(2.0 * math.pi * up_to / (mesh * factors) * (1.0 + 1e-12)), 1, most).astype(int)
+    turns = first.structured.orbit is not None
+    carrier, bands = (_carrier_speed(model, stage), dynamics.side_bands) if turns else (0.0, 0)
+    most = dynamics.mesh_harmonics or _MOST
+    highest = np.floor(2.0 * math.pi * dynamics.up_to / (mesh * factors) * (1.0 + 1e-12))
+    counts = np.clip(highest, 1, most).astype(int)
+    stages, longest = [part.structured.running for part in parts], int(counts.argmax())
 
-    def solve(i: int) -> RunningResponse:
-        both, bands = (int(counts[i]), int(counts[i])), 0
-        if part.structured.orbit is not None:
-            bands = model.case.dynamics.side_bands
-        known = {"harmonics": both, "side_bands": bands, "tolerance": model.case.dynamics.tolerance}
-        return solve_running(running, mesh * factors[i], carrier * factors[i], **known)
+    def solve(i: int) -> list[RunningResponse]:
+        known = {"harmonics": (int(counts[i]),) * 2, "side_bands": bands, "tolerance": dynamics.tolerance}
+        return solve_excitations(stages, mesh * factors[i], carrier * factors[i], **known)
 
-    widest, sensors = solve(int(counts.argmax())), gearbox_sensors(model.case)
-    on_own_ring = [number for number, sensor in enumerate(sensors) if sensor.ring == part.name]
-    places = np.array([sensors[i].angle for i in on_own_ring]), np.array([sensors[i].on_ring for i in on_own_ring])
-    on_ring = ring_lines(running, widest, *places)
-    harmonic, band, at = _line_numbers(widest, running.paths.symmetry, on_ring, on_pins=part.forces is not None)
-    precision = np.complex64 if len(factors) > _MANY else np.complex128
-    motion = np.zeros((len(factors), measured, len(harmonic)), precision)
-    count = len(running.paths.planet_angles)
-    kinds = len(range(running.kinds)[part.own])
-    force, dynamic = np.zeros((len(factors), kinds, 3)), np.zeros((len(factors), kinds))
-    approach, figures = np.full((len(factors), len(outputs) - measured), np.nan), np.zeros((5, len(factors)))
-    by_path = None
-    if paths is not None:
-        by_path = np.zeros((len(factors), len(paths.names), len(paths.sensors), len(harmonic)), complex)
-    mean = running.excitation.force.mean(axis=1).reshape(-1, count)[part.own].mean(axis=1)
+    most_lines = solve(longest)
+    of_parts = [
+        _PartLines(found, part, rows, len(factors), response, paths)
+        for part, rows, response in zip(parts, outputs, most_lines, strict=True)
+    ]
 
     def keep(i: int) -> None:
-        response = widest if i == int(counts.argmax()) else solve(i)
-        few = harmonic < len(response.modal)
-        amplitude = response.lines(outputs.T)[harmonic[few], at[few]]
-        amplitude[:, on_own_ring] += ring_lines(running, response, *places)[harmonic[few], at[few]]
-        motion[i][:, few] = amplitude[:, :measured].T
-        approach[i] = np.sqrt(0.5 * (np.abs(amplitude[:, measured:]) ** 2).sum(axis=0))
-        if paths is not None and by_path is not None:
-            forces = response.one_sided(forces_on_casing(paths, found, part.name, part.structured, response))
-            moved = response.lines(part.structured.motion[paths.places].T)[harmonic[few], at[few]].T
-            omega = response.frequency[harmonic[few], at[few]]
-            by_path[i][..., few] = paths.heard(np.moveaxis(forces[harmonic[few], at[few]], 0, -1), moved, omega)
-        if part.forces is not None:
-            motion[i][:, few] += _on_pins(part.forces, model, response, measured, (harmonic[few], at[few])).T
-            _add_branch_meshes(approach[i], part.forces, model, response)
-        low, high, dynamic[i] = _extremes(response, part.own)
-        force[i] = np.stack([mean, mean + high, mean + low], axis=1)
-        figures[:, i] = response.residual, response.radius, *response.tail, response.products
+        for lines, response in zip(of_parts, most_lines if i == longest else solve(i), strict=True):
+            lines.keep(i, response)
 
     with ThreadPoolExecutor(os.cpu_count() or 1) as pool:
         list(pool.map(keep, range(len(factors))))
-    approach[:, list(part.meshes)] = np.nan
     nominal = abs(model.flow.speed[reference_shaft(model)])
-    order = (harmonic * mesh + band * carrier) / nominal
-    stiffness = running.excitation.stiffness.reshape(running.kinds, count, -1)[part.own]
-    mean_stiffness = stiffness.mean(axis=(1, 2))
-    spread = stiffness.std(axis=2).max(axis=1)
-    residual, radius, tail, outer, products = figures
-    lines = part.name, harmonic, band, order, motion, force, mean_stiffness, spread, dynamic, approach
-    solved = residual, radius, tail, outer, products.astype(int), counts
-    return StageLines(*lines, *solved, part.meshes, _varying(part), by_path)
+    return [lines.collected(mesh / nominal, carrier / nominal, counts) for lines in of_parts]
+
+
+class _PartLines:
+    """Lines of one part at all speeds, kept speed by speed.
+
+    Parameters
+    ----------
+    found : Deflection
+        Loaded state.
+    part : _ExcitingPart
+        What excites.
+    outputs : (k, m) array
+        Per unit of a mode of the structure, the last ones approaches of meshes.
+    speeds : int
+        Their number.
+    longest : RunningResponse
+        That with the most harmonics.
+    paths : CasingPaths or None
+        Into the casing.
+    """
+
+    def __init__(
+        self,
+        found: Deflection,
+        part: _ExcitingPart,
+        outputs: np.ndarray,
+        speeds: int,
+        longest: RunningResponse,
+        paths: CasingPaths | None,
+    ):
+        self.found, self.part, self.outputs, self.casing_paths = found, part, outputs, paths
+        running, sensors = part.structured.running, gearbox_sensors(found.model.case)
+        self.on_own_ring = [number for number, sensor in enumerate(sensors) if sensor.ring == part.name]
+        on_ring = [sensors[i] for i in self.on_own_ring]
+        self.places = np.array([sensor.angle for sensor in on_ring]), np.array([sensor.on_ring for sensor in on_ring])
+        at_ring = ring_lines(running, longest, *self.places)
+        self.harmonic, self.band, self.at = _line_numbers(
+            longest, running.paths.symmetry, at_ring, on_pins=part.forces is not None
+        )
+        self.measured = len(outputs) - len(found.model.assembly.contacts)
+        precision = np.complex64 if speeds > _MANY else np.complex128
+        self.motion = np.zeros((speeds, self.measured, len(self.harmonic)), precision)
+        count = len(running.paths.planet_angles)
+        self.mean_force = running.excitation.force.mean(axis=1).reshape(-1, count)[part.own].mean(axis=1)
+        kinds = len(self.mean_force)
+        self.force, self.dynamic_force = np.zeros((speeds, kinds, 3)), np.zeros((speeds, kinds))
+        self.approach = np.full((speeds, len(outputs) - self.measured), np.nan)
+        self.figures = np.zeros((5, speeds))
+        self.by_path = None
+        if paths is not None:
+            self.by_path = np.zeros((speeds, len(paths.names), len(paths.sensors), len(self.harmonic)), complex)
+
+    def keep(self, i: int, response: RunningResponse) -> None:
+        """Keep the lines at a speed."""
+        part, model, running = self.part, self.found.model, self.part.structured.running
+        few = self.harmonic < len(response.modal)
+        there = self.harmonic[few], self.at[few]
+        amplitude = response.lines(self.outputs.T)[there]
+        amplitude[:, self.on_own_ring] += ring_lines(running, response, *self.places)[there]
+        self.motion[i][:, few] = amplitude[:, : self.measured].T
+        self.approach[i] = np.sqrt(0.5 * (np.abs(amplitude[:, self.measured :]) ** 2).sum(axis=0))
+        if self.casing_paths is not None and self.by_path is not None:
+            paths, motion = self.casing_paths, part.structured.motion
+            forces = forces_on_casing(paths, self.found, part.name, part.structured, response)
+            forces = np.moveaxis(response.one_sided(forces)[there], 0, -1)
+            moved = response.lines(motion[paths.places].T)[there].T
+            self.by_path[i][..., few] = paths.heard(forces, moved, response.frequency[there])
+        if part.forces is not None:
+            self.motion[i][:, few] += _on_pins(part.forces, model, response, self.measured, there).T
+            _add_branch_meshes(self.approach[i], part.forces, model, response)
+        low, high, self.dynamic_force[i] = _extremes(response, part.own)
+        self.force[i] = np.stack([self.mean_force, self.mean_force + high, self.mean_force + low], axis=1)
+        self.figures[:, i] = response.residual, response.radius, *response.tail, response.products
+
+    def collected(self, mesh_order: float, carrier_order: float, counts: np.ndarray) -> StageLines:
+        """Collect the lines of all speeds by the orders of mesh and carrier, and the harmonics (v,) of each."""
+        part, running = self.part, self.part.structured.running
+        self.approach[:, list(part.meshes)] = np.nan
+        order = self.harmonic * mesh_order + self.band * carrier_order
+        count = len(running.paths.planet_angles)
+        stiffness = running.excitation.stiffness.reshape(running.kinds, count, -1)[part.own]
+        residual, radius, tail, outer, products = self.figures
+        lines = part.name, self.harmonic, self.band, order, self.motion, self.force
+        means = stiffness.mean(axis=(1, 2)), stiffness.std(axis=2).max(axis=1), self.dynamic_force, self.approach
+        solved = residual, radius, tail, outer, products.astype(int), counts
+        return StageLines(*lines, *means, *solved, part.meshes, _varying(part), self.by_path)
 
 
 def _varying(part: _ExcitingPart) -> tuple[int, ...]:

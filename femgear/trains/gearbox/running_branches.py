@@ -107,7 +107,7 @@ def branch_stage(
     gone, meshes = {at for own in stations for at in own}, {s.meshes[0] for names in kinds for s in names}
     modes, motion, inner = structure_modes(found, structure_apart(found, gone, meshes, rings), rings)
     frequencies = [model.flow.mesh_frequency[names[0].name] for names in kinds]
-    together = [n for n, hertz in enumerate(frequencies) if math.isclose(hertz, frequencies[kind], rel_tol=1e-9)]
+    together = kinds_together(model, running, kind)
     order = [*together, *(n for n in range(len(kinds)) if n not in together)]
     first = _Branch(found, running, stations[0])
     points, of_mesh = first.meshes([kinds[n] for n in order])
@@ -159,6 +159,41 @@ def branch_stage(
     )
     of_meshes = np.array([True] * len(points) + [False] * len(pins) + [True] * (len(rows) - len(points) - len(pins)))
     return StructuredStage(stage, motion, tuple(rows), of_meshes, inner, orbit), forces
+
+
+def kinds_together(model: GearboxModel, running: RunningSet, kind: int) -> list[int]:
+    """Numbers of the kinds that have the mesh frequency of one of them."""
+    frequencies = [model.flow.mesh_frequency[names[0]] for names in running.kinds]
+    return [n for n, hertz in enumerate(frequencies) if math.isclose(hertz, frequencies[kind], rel_tol=1e-9)]
+
+
+def branch_kinds(
+    found: Deflection,
+    running: RunningSet,
+    kinds: Sequence[int],
+    excitations: Mapping[str, MeshExcitation],
+    phases: Mapping[str, float],
+    rings: Sequence[ElasticRing] = (),
+) -> list[list[tuple[StructuredStage, BranchForces]]]:
+    """Take the branches of a carrier out of a gearbox for kinds of one mesh frequency, each of which excites it.
+
+    Parameters are those of `branch_stage`, ``kinds`` the numbers of the kinds. Those that differ in their excitation
+    alone stand together, see `femgear.housing.two_way.running_planets.solve_excitations`.
+    """
+    structured, forces = branch_stage(found, running, kinds[0], excitations, phases, rings)
+    together, stages = kinds_together(found.model, running, kinds[0]), {s.name: s for s in found.model.stages}
+    meshes = [[stages[name] for name in running.kinds[n]] for n in together]
+    first, made = structured.running, [[(structured, forces)]]
+    for kind in kinds[1:]:
+        excitation, paths, sense = kinds_in_time(found, running, meshes, kind, excitations, phases)
+        mean, own = excitation.stiffness.mean(axis=1).reshape(len(together), -1).mean(axis=1), together.index(kind)
+        alike = np.array_equal(mean, first.stiffness[: len(together)]) and paths == first.paths
+        if alike and (excitation.source is None) == (first.rubbing is None):
+            stage = replace(first, excitation=excitation, sense=sense)
+            made[0].append((replace(structured, running=stage), replace(forces, own=slice(own, own + 1))))
+        else:
+            made.append([branch_stage(found, running, kind, excitations, phases, rings)])
+    return made
 
 
 def branch_stations(model: GearboxModel, planets: Sequence[str]) -> list[int]:

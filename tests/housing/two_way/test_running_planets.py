@@ -280,7 +280,7 @@ def test_planets_that_bend_have_springs_between_their_own_motions(symmetry):
     )
     known = {"harmonics": (2, 4), "side_bands": 5, "tolerance": 1e-13}
     # springs that are no round shaft's tie all motions together
-    assert [motions.shape for motions in bending.independent_motions] == [(6, 6)]
+    assert [motions.ways.shape for motions in bending.independent_motions] == [(6, 6)]
     bent, sprung = (solve_running(one, 13 * TURN, TURN, **known) for one in (bending, joined))
     assert np.abs(bent.modal - sprung.modal).max() < 1e-9 * np.abs(sprung.modal).max()
     assert np.abs(bent.force - sprung.force[:, :4]).max() < 1e-9 * np.abs(sprung.force).max()

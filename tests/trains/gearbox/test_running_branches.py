@@ -18,14 +18,14 @@ from planet_gearboxes import (
     stepped_set,
 )
 
-from femgear.housing.two_way.running_planets import solve_running
+from femgear.housing.two_way.running_planets import solve_excitations, solve_running
 from femgear.system.system import MeshExcitation
 from femgear.trains.gearbox.deflection import solve_deflection
 from femgear.trains.gearbox.excitation import pair_count_excitation
 from femgear.trains.gearbox.planet_branches import running_sets
 from femgear.trains.gearbox.planet_shafts import pair_phases, standing_planets
 from femgear.trains.gearbox.response_results import GearboxResponseResult
-from femgear.trains.gearbox.running_branches import branch_stage
+from femgear.trains.gearbox.running_branches import branch_kinds, branch_stage, kinds_together
 from femgear.trains.gearbox.sensors import sensor_rows
 from femgear.trains.gearbox.stage_structure import running_stage
 from femgear.trains.reading import read_case
@@ -170,11 +170,41 @@ def test_round_planets_that_bend_whirl_both_ways_alone(monkeypatch):
     phases = pair_phases(state.model.case, state.model.flow)
     (around,) = running_sets(state.model.case)
     stage = branch_stage(state, around, 0, excitations, phases)[0].running
-    sizes = sorted(motions.shape[1] for motions in stage.independent_motions)
+    sizes = sorted(len(motions.mass) for motions in stage.independent_motions)
     assert sizes == [2, 2, 4, 4] and sum(sizes) == len(stage.mass)
     speeds, known = (2000.0, 60.0), {"harmonics": (3, 3), "side_bands": 4, "tolerance": 1e-13}
     alone = solve_running(stage, *speeds, **known)
-    monkeypatch.setattr(type(stage), "independent_motions", property(lambda stage: (np.eye(len(stage.mass)),)))
+    monkeypatch.setattr(type(stage), "independent_motions", property(lambda stage: (stage.planet_motions,)))
     whole = solve_running(stage, *speeds, **known)
     np.testing.assert_allclose(alone.modal, whole.modal, rtol=0.0, atol=1e-11 * np.abs(whole.modal).max())
     np.testing.assert_allclose(alone.force, whole.force, rtol=0.0, atol=1e-11 * np.abs(whole.force).max())
+
+
+def test_kinds_of_one_mesh_frequency_are_solved_at_once_as_each_alone():
+    state = solve_deflection(read_case(simple_set(mesh=COUNTED, torque=90.0)))
+    excitations = {stage.name: pair_count_excitation(state.model, stage) for stage in state.model.stages}
+    phases = pair_phases(state.model.case, state.model.flow)
+    (around,) = running_sets(state.model.case)
+    assert kinds_together(state.model, around, 1) == [0, 1]
+    (together,) = branch_kinds(state, around, [0, 1], excitations, phases)
+    speeds, known = (2000.0, 60.0), {"harmonics": (4, 4), "side_bands": 4, "tolerance": 1e-13}
+    at_once = solve_excitations([structured.running for structured, _ in together], *speeds, **known)
+    for kind, ((_, forces), response) in enumerate(zip(together, at_once, strict=True)):
+        structured, own = branch_stage(state, around, kind, excitations, phases)
+        alone = solve_running(structured.running, *speeds, **known)
+        assert forces.own == own.own
+        np.testing.assert_allclose(response.force, alone.force, rtol=0.0, atol=1e-12 * np.abs(alone.force).max())
+        np.testing.assert_allclose(response.modal, alone.modal, rtol=0.0, atol=1e-12 * np.abs(alone.modal).max())
+
+
+def test_kinds_of_other_stiffness_stand_apart():
+    """A kind whose record is shorter than that of another one, and so none beside it, has its own mean stiffness."""
+    state = solve_deflection(read_case(simple_set(mesh=COUNTED, torque=90.0)))
+    excitations = {stage.name: pair_count_excitation(state.model, stage) for stage in state.model.stages}
+    for name in [name for name in excitations if name.endswith("ring")]:
+        record = excitations[name]
+        arrays = {part: 1.1 * getattr(record, part)[:, ::2] for part in ("stiffness", "deflection", "force")}
+        excitations[name] = replace(record, **arrays)
+    phases = pair_phases(state.model.case, state.model.flow)
+    (around,) = running_sets(state.model.case)
+    assert [len(group) for group in branch_kinds(state, around, [0, 1], excitations, phases)] == [1, 1]
