@@ -100,7 +100,7 @@ class PlanetMotions:
     def part(self, ways: np.ndarray) -> PlanetMotions:
         """Take some of the motions, ways (p, n)."""
         matrices = (self.mass, self.gyroscopic, self.turning, self.elastic)
-        return PlanetMotions(ways, *(None if own is None else ways.conj().T @ own @ ways for own in matrices))  # type: ignore[arg-type]
+        return PlanetMotions(ways, *(None if matrix is None else ways.conj().T @ matrix @ ways for matrix in matrices))  # type: ignore[arg-type]
 
 
 @dataclass(frozen=True)
@@ -385,8 +385,16 @@ def solve_running(
     cycles : int
         Of GMRES.
     """
-    known = {"harmonics": harmonics, "side_bands": side_bands, "tolerance": tolerance, "cycles": cycles}
-    return solve_excitations((stage,), mesh_frequency, carrier_speed, **known)[0]
+    (response,) = solve_excitations(
+        (stage,),
+        mesh_frequency,
+        carrier_speed,
+        harmonics=harmonics,
+        side_bands=side_bands,
+        tolerance=tolerance,
+        cycles=cycles,
+    )
+    return response
 
 
 def solve_excitations(
