@@ -24,6 +24,7 @@ from validation import (
     dynamics,
     elasticity,
     face_width,
+    fault_orders,
     faults,
     fixed_housing,
     friction,
@@ -359,12 +360,20 @@ THEMES = (
     Theme(
         "faults",
         "Faulty teeth",
-        "Reference set, cracks at 70° to the centre line of their tooth, their faces open. "
+        "Reference set, cracks at 70° to the centre line of their tooth, their faces open. Orders: sets of 3, 4 and 5 "
+        "planets, also bolted and at unequal angles, with a worn tooth, as sets and as stages of gearboxes. "
         "Compared with: the whole matrix of all cuts; one grid of all teeth; the healthy gear where nothing parts; the "
-        "energy release rate by J in two domains; published frequencies of a set 17/37/91; gates: 1e-12; 1 %; every "
-        "bit; 2 %; printed digits.",
+        "energy release rate by J in two domains; published frequencies of a set 17/37/91; formulas of the orders; "
+        "gates: 1e-12; 1 %; every bit; 2 %; printed digits; 1e-9 of the largest line; 3 % of a gearbox beside the set.",
         (faults.frequencies, faults.energy_release),
-        (faults.no_crack, faults.update_identity, faults.one_grid),
+        (
+            faults.no_crack,
+            faults.update_identity,
+            faults.one_grid,
+            fault_orders.orders_of_sets,
+            fault_orders.orders_of_stages,
+            fault_orders.orders_of_pair,
+        ),
     ),
     Theme(
         "rims",

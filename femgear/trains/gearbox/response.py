@@ -57,8 +57,9 @@ class StageLines:
     ----------
     name : str
         Of the stage.
-    harmonic, side_band : (L,) int arrays
-        Mesh harmonic of every line, and the turns of the carrier beside it.
+    harmonic, side_band : (L,) arrays
+        Multiple of the mesh frequency of every line, broken where teeth repeat after several mesh periods, and the
+        turns of the carrier beside it.
     order : (L,) array
         Frequency over that of the reference shaft [1].
     motion : (v, k, L) complex array
@@ -445,12 +446,13 @@ class _PartLines:
         on_ring = [sensors[i] for i in self.on_own_ring]
         self.places = np.array([sensor.angle for sensor in on_ring]), np.array([sensor.on_ring for sensor in on_ring])
         at_ring = ring_lines(running, longest, *self.places)
-        self.harmonic, self.band, self.at = _line_numbers(
+        self.line, self.band, self.at = _line_numbers(
             longest, running.paths.symmetry, at_ring, on_pins=part.forces is not None
         )
+        self.periods = longest.orders.periods
         self.measured = len(outputs) - len(found.model.assembly.contacts)
         precision = np.complex64 if speeds > _MANY else np.complex128
-        self.motion = np.zeros((speeds, self.measured, len(self.harmonic)), precision)
+        self.motion = np.zeros((speeds, self.measured, len(self.line)), precision)
         count = len(running.paths.planet_angles)
         self.mean_force = running.excitation.force.mean(axis=1).reshape(-1, count)[part.own].mean(axis=1)
         kinds = len(self.mean_force)
@@ -459,13 +461,13 @@ class _PartLines:
         self.figures = np.zeros((5, speeds))
         self.by_path = None
         if paths is not None:
-            self.by_path = np.zeros((speeds, len(paths.names), len(paths.sensors), len(self.harmonic)), complex)
+            self.by_path = np.zeros((speeds, len(paths.names), len(paths.sensors), len(self.line)), complex)
 
     def keep(self, i: int, response: RunningResponse) -> None:
         """Keep the lines at a speed."""
         part, model, running = self.part, self.found.model, self.part.structured.running
-        few = self.harmonic < len(response.modal)
-        there = self.harmonic[few], self.at[few]
+        few = self.line < len(response.modal)
+        there = self.line[few], self.at[few]
         amplitude = response.lines(self.outputs.T)[there]
         amplitude[:, self.on_own_ring] += ring_lines(running, response, *self.places)[there]
         self.motion[i][:, few] = amplitude[:, : self.measured].T
@@ -487,11 +489,12 @@ class _PartLines:
         """Collect the lines of all speeds by the orders of mesh and carrier, and the harmonics (v,) of each."""
         part, running = self.part, self.part.structured.running
         self.approach[:, list(part.meshes)] = np.nan
-        order = self.harmonic * mesh_order + self.band * carrier_order
+        harmonic = self.line / self.periods
+        order = harmonic * mesh_order + self.band * carrier_order
         count = len(running.paths.planet_angles)
         stiffness = running.excitation.stiffness.reshape(running.kinds, count, -1)[part.own]
         residual, radius, tail, outer, products = self.figures
-        lines = part.name, self.harmonic, self.band, order, self.motion, self.force
+        lines = part.name, harmonic, self.band, order, self.motion, self.force
         means = stiffness.mean(axis=(1, 2)), stiffness.std(axis=2).max(axis=1), self.dynamic_force, self.approach
         solved = residual, radius, tail, outer, products.astype(int), counts
         return StageLines(*lines, *means, *solved, part.meshes, _varying(part), self.by_path)
@@ -516,7 +519,7 @@ def _on_pins(
 ) -> np.ndarray:
     """Lines (L, outputs) of the forces of bearings on pins on their planets, along the axes of the planet [N].
 
-    ``lines`` are harmonics and places of the side bands of the structure.
+    ``lines`` are their numbers and places of the side bands of the structure.
     """
     found, sensors = np.zeros((len(lines[0]), outputs), complex), len(gearbox_sensors(model.case))
     places = response.orders.place(response.band[lines[1]])
@@ -546,15 +549,15 @@ def _add_branch_meshes(
 def _line_numbers(
     response: RunningResponse, symmetry: int, on_ring: np.ndarray, *, on_pins: bool = False
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Harmonic and side band (L,) of the lines of structure, ring and pins, and the places of these bands."""
+    """Line and side band (L,) of what moves structure, ring and pins, and the places of these bands."""
     moved = (np.abs(response.modal).max(axis=2) > 0.0) | (np.abs(on_ring).max(axis=2, initial=0.0) > 0.0)
     if symmetry > 1:
         moved[0, response.band % symmetry != 0] = False
     if on_pins:
         moved |= np.abs(response.band) <= response.orders.bands[-1]
     moved[0, response.band <= 0] = False
-    harmonic, at = np.nonzero(moved)
-    return harmonic, response.band[at], at
+    line, at = np.nonzero(moved)
+    return line, response.band[at], at
 
 
 def _extremes(response: RunningResponse, own: slice) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -170,7 +170,7 @@ def short_origin(data: xr.Dataset, line: int) -> str:
     """Write where a line comes from, in short: stage, mesh harmonic, turns of the carrier beside it."""
     band = int(data["side_band"].values[line])
     beside = f" {band:+d}".replace("-", "−") if band else ""
-    return f"{data['origin'].values[line]}, {int(data['harmonic'].values[line])}{beside}"
+    return f"{data['origin'].values[line]}, {data['harmonic'].values[line]:.4g}{beside}"
 
 
 def _name_lines(ax, data: xr.Dataset, frequency: np.ndarray, size: np.ndarray, ends: tuple[float, float]) -> None:

@@ -328,7 +328,7 @@ def _of_lines(found: GearboxResponse) -> dict[str, tuple]:
             "1",
             "stage that makes the line",
         ),
-        "harmonic": ("line", joined(lambda stage: stage.harmonic), "1", "mesh harmonic of the line"),
+        "harmonic": ("line", joined(lambda stage: stage.harmonic), "1", "multiple of the mesh frequency"),
         "side_band": ("line", joined(lambda stage: stage.side_band), "1", "turns of the carrier beside the harmonic"),
     }
 
@@ -560,10 +560,10 @@ def main_way(data: xr.Dataset, sensor: int) -> str:
 
 def line_origin(data: xr.Dataset, line: int) -> str:
     """Write where a line comes from: stage, mesh harmonic, turns of the carrier beside it."""
-    harmonic, band = int(data["harmonic"].values[line]), int(data["side_band"].values[line])
+    harmonic, band = float(data["harmonic"].values[line]), int(data["side_band"].values[line])
     side = f" {'-' if band < 0 else '+'} {abs(band)} x carrier" if band else ""
     return (
-        f"{data['origin'].values[line]}, mesh harmonic {harmonic}{side}"
+        f"{data['origin'].values[line]}, mesh harmonic {harmonic:g}{side}"
         if harmonic
         else (f"{data['origin'].values[line]}, {band} x carrier")
     )

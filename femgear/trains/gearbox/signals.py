@@ -135,7 +135,7 @@ def _order_rows(data: xr.Dataset, modes: xr.Dataset | None) -> Iterator[Sequence
                 break
             level = 20.0 * np.log10(amplitude / np.sqrt(2.0) / REFERENCE_ACCELERATION)
             near = float(elastic[np.abs(np.log(elastic / hertz)).argmin()]) if len(elastic) else float("nan")
-            origin = float(orders[line]), str(stages[line]), int(harmonics[line]), int(bands[line])
+            origin = float(orders[line]), str(stages[line]), harmonics[line].item(), int(bands[line])
             yield (str(sensor), speed, hertz, *origin, amplitude, float(level), 0.5 * (amplitude / whole) ** 2, near)
 
 

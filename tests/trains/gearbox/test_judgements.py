@@ -45,7 +45,7 @@ def test_the_questions_of_a_gearbox_in_a_casing(results):
     hertz = data["order"].values[line] * data["speed"].values[0] / 60.0
     power = 0.5 * (size[0, sensor, line] / data["level"].values[0, sensor]) ** 2
     sentence = judged[QUIET].sentence
-    assert f"mesh harmonic {data['harmonic'].values[line]} at {hertz:,.0f} Hz" in sentence
+    assert f"mesh harmonic {data['harmonic'].values[line]:g} at {hertz:,.0f} Hz" in sentence
     mode = near_mode(results.modes, hertz)
     near = f" near {mode}," if mode else ""
     assert f"{near} makes {power:.0%} of the power" in sentence

@@ -31,6 +31,29 @@ def test_lines_are_multiples_of_the_mesh_frequency():
     assert np.abs(stage.motion[1][0, stage.harmonic <= 3]).min() > 0.0
 
 
+def test_teeth_that_repeat_after_several_mesh_periods_have_lines_between_harmonics(monkeypatch):
+    """The same two mesh periods as one record have the same lines where they were, and none between."""
+    from femgear.trains.gearbox import response as module
+
+    once, excitation_of = response(), module.excitation_of
+
+    def twice(*arguments, **options):
+        drive = excitation_of(*arguments, **options)
+        names = ("stiffness", "deflection", "force")
+        return replace(drive, periods=2, **{name: np.tile(getattr(drive, name), 2) for name in names})
+
+    monkeypatch.setattr(module, "excitation_of", twice)
+    again = solve_gearbox_response(once.deflection, once.speed)
+    (single,), (double,) = once.stages, again.stages
+    assert double.order == pytest.approx(24.0 * double.harmonic)
+    whole = double.harmonic % 1.0 == 0.0
+    assert double.harmonic[whole].tolist() == single.harmonic.tolist()
+    sizes = accelerations(again, 3)["stage"], accelerations(once, 3)["stage"]
+    largest = np.abs(sizes[1]).max()
+    assert np.abs(sizes[0][..., whole] - sizes[1]).max() < 1e-9 * largest
+    assert np.abs(sizes[0][..., ~whole]).max(initial=0.0) < 1e-9 * largest
+
+
 def test_the_casing_moves_as_feet_and_bearings_push_it():
     found = response()
     (stage,) = found.stages

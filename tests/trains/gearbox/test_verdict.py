@@ -26,7 +26,7 @@ def test_levels_come_with_line_way_and_mode(results):
     hertz = data["order"].values[at] * data["speed"].values[0] / 60.0
     assert rows["level at top"].startswith(level_text(float(data["level"].values[0, 0])))
     main = rows["main line at top"]
-    assert main.startswith(f"{hertz:.1f} Hz, stage, mesh harmonic {data['harmonic'].values[at]}")
+    assert main.startswith(f"{hertz:.1f} Hz, stage, mesh harmonic {data['harmonic'].values[at]:g}")
     assert main.endswith(nearest_mode(results.modes, hertz))
     way = data["path"].values[int(data["path_share"].values[0, :, 0].argmax())]
     assert rows["most of it at top comes by"].startswith(str(way))
