@@ -60,6 +60,8 @@ _PARTS = {
     "runup": ("explorer.js",),
 }
 """Scripts of the parts of the page that have a place of their own."""
+_LATER = '<script type="text/plain" class="later">'
+"""Beginning of a script that `later.js` runs."""
 
 
 def write_figures(
@@ -184,8 +186,7 @@ def page(train: Train, results: Results, *, static: bool = False) -> str:
 
 def document(title: str, main: str, data: dict[str, Any] | None, *, script: str = "") -> str:
     """Make an HTML file of its title, its contents and what scripts draw, none where it is None, and a script more."""
-    scripts = "" if data is None else _scripts(data)
-    scripts += f"<script>{script}</script>\n" if script else ""
+    scripts = "" if data is None else _scripts(data, script)
     main, title = (_CONTROLS.sub(lambda match: printable(match[0]), text) for text in (main, escape(title)))
     return (
         '<!DOCTYPE html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
@@ -206,13 +207,15 @@ def _counted(warnings: Sequence[Finding]) -> str:
     return f"{len(warnings)}{' (' + ', '.join(severe) + ')' if severe else ''}"
 
 
-def _scripts(data: dict[str, object]) -> str:
-    """Data and scripts of a page that can be read off and turned."""
+def _scripts(data: dict[str, object], script: str) -> str:
+    """Data and scripts of a page that can be read off and turned, which run once its words are seen."""
     text = json.dumps(data, allow_nan=False, separators=(",", ":"), sort_keys=True)
     packed = base64.b64encode(zlib.compress(text.encode(), 9)).decode("ascii")
     parts = [name for part, names in _PARTS.items() if any(key.startswith(part) for key in data) for name in names]
     files = ("plotly-cartesian.min.js", "charts.js", *parts)
-    scripts = "".join(f"<script>{(_WEB / name).read_text('utf-8')}</script>\n" for name in files)
+    texts = [*((_WEB / name).read_text("utf-8") for name in files), *([script] if script else [])]
+    scripts = "".join(f"{_LATER}{text}</script>\n" for text in texts)
+    scripts += f"<script>{(_WEB / 'later.js').read_text('utf-8')}</script>\n"
     return (
         '<noscript><p class="note">Charts need scripts, which are in this file: femgear report --static '
         "writes a page without any.</p></noscript>\n"
@@ -222,7 +225,7 @@ def _scripts(data: dict[str, object]) -> str:
 
 def _policy(scripts: str) -> str:
     """Allow the page its own scripts, by their checksums, and nothing from anywhere."""
-    texts = re.findall(r"<script>(.*?)</script>", scripts, re.DOTALL)
+    texts = re.findall(rf"(?:<script>|{_LATER})(.*?)</script>", scripts, re.DOTALL)
     digests = [base64.b64encode(hashlib.sha256(text.encode()).digest()).decode() for text in texts]
     allowed = " ".join(f"'sha256-{digest}'" for digest in digests) or "'none'"
     return (

@@ -249,8 +249,11 @@ page.start = async () => {
   addEventListener("afterprint", () => { document.documentElement.classList.remove("paper"); page.dark = dark.matches;
     document.querySelectorAll("details").forEach((one) => { one.open = one.dataset.open === "true"; });
     redraw(); });
-  page.parts.forEach((part) => part());
+  // charts in view come before what is in space
+  for (const part of page.parts) {
+    await later.seen();
+    part();
+  }
   document.documentElement.dataset.ready = "yes";
 };
 page.parts = [];
-addEventListener("DOMContentLoaded", page.start);
