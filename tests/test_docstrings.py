@@ -2,14 +2,20 @@
 
 import ast
 import re
+from functools import cache
 from pathlib import Path
 
 PACKAGE = Path(__file__).parents[1] / "femgear"
 
 
+@cache
+def tree(path: Path) -> ast.Module:
+    return ast.parse(path.read_text(encoding="utf-8"))
+
+
 def dataclasses(path: Path) -> list[ast.ClassDef]:
     """All dataclasses of a module, public and private, wherever they stand."""
-    classes = [node for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))) if isinstance(node, ast.ClassDef)]
+    classes = [node for node in ast.walk(tree(path)) if isinstance(node, ast.ClassDef)]
     return [node for node in classes if any("dataclass" in ast.unparse(one) for one in node.decorator_list)]
 
 
@@ -44,7 +50,7 @@ SHAPE = re.compile(r"\((?:\.\.\.|.*,.*|\d+)\)|shape")
 
 def public_functions(path: Path) -> list[tuple[str, ast.FunctionDef]]:
     """All functions of a module, and all methods of its classes, that have no private name."""
-    body = ast.parse(path.read_text(encoding="utf-8")).body
+    body = tree(path).body
     functions = [(node.name, node) for node in body if isinstance(node, ast.FunctionDef)]
     for owner in (node for node in body if isinstance(node, ast.ClassDef) and not node.name.startswith("_")):
         functions += [(f"{owner.name}.{node.name}", node) for node in owner.body if isinstance(node, ast.FunctionDef)]
