@@ -58,6 +58,9 @@ def test_shares_add_up_to_one_and_are_none_without_torque():
     assert record.load_share == pytest.approx(np.array([[0.75, 0.0], [0.25, 0.0]]))
     wedged = replace(record, back_force=np.array([[1.0, 1.0], [0.0, 0.0], [0.0, 0.0], [0.0, 0.0]]))
     assert wedged.wedged.tolist() == [[True, False], [False, False], [False, False], [False, False]]
+    # teeth that are wedged without torque: what is left of their forces is rounding, and has no shares
+    rounding = replace(record, force=np.full((4, 2), 1.0 + 1e-12), back_force=np.ones((4, 2)))
+    assert not rounding.load_share.any()
 
 
 def test_secant_stiffness_is_zero_where_nothing_is_carried():
