@@ -107,7 +107,7 @@ class StageBalance:
         return (force > 0.0).mean(axis=(0, 1))
 
 
-def solve_balance(found: Deflection, *, steps: Steps | None = None, progress: Progress = silent) -> list[StageBalance]:
+def solve_balance(state: Deflection, *, steps: Steps | None = None, progress: Progress = silent) -> list[StageBalance]:
     """Solve for the periodic motion with flanks that part, of all stages that excite the gearbox, one after the other.
 
     Without any of those that weight lets rattle, at constant stiffness.
@@ -117,34 +117,34 @@ def solve_balance(found: Deflection, *, steps: Steps | None = None, progress: Pr
 
     Parameters
     ----------
-    found : Deflection
+    state : Deflection
         Loaded state.
     steps : Steps, optional
         What other computations have left: excitations are kept in it.
     progress : callable
         Called with ("balance", done, total).
     """
-    wanted, solved = found.model.case.balance, list[StageBalance]()
-    weighed = [stage.name for stage in weighed_sections(found.model.case)]
-    stages = [stage for stage in found.model.stages if stage.name in weighed] or exciting_stages(found)
+    wanted, solved = state.model.case.balance, list[StageBalance]()
+    weighed = [stage.name for stage in weighed_sections(state.model.case)]
+    stages = [stage for stage in state.model.stages if stage.name in weighed] or exciting_stages(state)
     for number, stage in enumerate(stages):
         progress("balance", number, len(stages))
         rubs = isinstance(stage.section, PairSection)
         if weighed:
-            drive = constant_excitation(found, stage)
+            drive = constant_excitation(state, stage)
         else:
-            drive = excitation_of(found, stage, steps=steps, friction=rubs)
+            drive = excitation_of(state, stage, steps=steps, friction=rubs)
         if drive.source is not None:
             # friction acts about its mean, which the torques of the gearbox do not know
-            mean = found.contacts[stage.name].normal_force[:, None]
+            mean = state.contacts[stage.name].normal_force[:, None]
             drive = replace(drive, force=drive.force - drive.force.mean(axis=1, keepdims=True) + mean)
         drives = {stage.name: drive}
         if wanted.together:
-            others = (one for one in found.model.stages if one is not stage)
-            drives |= {one.name: constant_excitation(found, one, steps=steps) for one in others}
+            others = (one for one in state.model.stages if one is not stage)
+            drives |= {other.name: constant_excitation(state, other, steps=steps) for other in others}
         known: dict[str, Any] = {"harmonics": wanted.harmonics, "back_flanks": wanted.back_flanks}
-        box = nonlinear_gearbox(found, drives, **known)
-        names = [one.name for one in box.stages]
+        box = nonlinear_gearbox(state, drives, **known)
+        names = [stage.name for stage in box.stages]
         solution = _solved(box, wanted, names.index(stage.name))
         solved.append(_moving(box, solution, names.index(stage.name)))
         if not number:
@@ -160,7 +160,7 @@ def _moving(box: NonlinearGearbox, solution: PeriodicSolution, place: int, *, ex
     forces = *forces_of_flanks(box, solution, place), tuple(box.bearings), forces_of_bearings(box, solution, place)
     lines = accelerations_at_sensors(box, solution)[:, : len(orders)]
     harmonic = orders[:, stage.mesh_base] / stage.excitation.periods
-    turns = {one.name: orders[:, one.turn_base] for one in box.stages if one.turns}
+    turns = {stage.name: orders[:, stage.turn_base] for stage in box.stages if stage.turns}
     return StageBalance(stage.name, stage.meshes, solution, *forces, lines, harmonic, turns)
 
 
@@ -435,7 +435,7 @@ def _at_sensors(stages: tuple[StageBalance, ...]) -> dict[str, Any]:
     }
     if carriers := carriers_that_turn(stages):
         none = {stage.name: np.zeros(len(stage.harmonic)) for stage in stages}
-        turns = [np.concatenate([one.turns.get(name, none[one.name]) for one in stages]) for name in carriers]
+        turns = [np.concatenate([stage.turns.get(name, none[stage.name]) for stage in stages]) for name in carriers]
         variables["turns"] = ("line carrier", (sense * turns).T, "1", "turns of the carrier of a stage in the line")
     return variables
 
@@ -449,10 +449,10 @@ def _of_bearings(stages: tuple[StageBalance, ...]) -> dict[str, Any]:
     """Variables of the bearings with play, while each of the stages excites."""
     force = [stage.bearing_force.reshape(-1, len(stage.bearings)) for stage in stages]
     values = {
-        "bearing_mean": ("N", "mean size of the force", [one.mean(axis=0) for one in force]),
-        "bearing_largest": ("N", "largest size of the force", [one.max(axis=0) for one in force]),
-        "bearing_lowest": ("N", "smallest size of the force", [one.min(axis=0) for one in force]),
-        "bearing_loose": ("1", "share of the time in its play", [(one == 0.0).mean(axis=0) for one in force]),
+        "bearing_mean": ("N", "mean size of the force", [of_case.mean(axis=0) for of_case in force]),
+        "bearing_largest": ("N", "largest size of the force", [of_case.max(axis=0) for of_case in force]),
+        "bearing_lowest": ("N", "smallest size of the force", [of_case.min(axis=0) for of_case in force]),
+        "bearing_loose": ("1", "share of the time in its play", [(of_case == 0.0).mean(axis=0) for of_case in force]),
     }
     return {name: ("stage bearing", np.array(table), unit, words) for name, (unit, words, table) in values.items()}
 

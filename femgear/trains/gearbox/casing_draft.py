@@ -86,7 +86,7 @@ def draft_casing(case: GearboxCase) -> tuple[str, tuple[Finding, ...]]:
 def wall_thickness(case: GearboxCase) -> float:
     """Estimate the thickness of the walls of a cast casing from the largest centre distance [m]."""
     sizes = [pair_sizes(stage) for stage in case.pair] + [set_sizes(stage) for stage in case.planetary]
-    largest = max((one.centre_distance for one in sizes), default=0.0)
+    largest = max((shaft_size.centre_distance for shaft_size in sizes), default=0.0)
     return max(_WALL_SHARE * largest + _WALL, _LEAST_WALL)
 
 

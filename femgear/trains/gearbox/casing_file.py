@@ -51,7 +51,7 @@ def casing_element(case: GearboxCase) -> Superelement:
         known = error.key in BoxCasingSection.model_fields
         error.key, error.file = f"casing.{error.key if known else 'file'}", error.file or str(file)
         raise
-    every = [refused_at(one, f"casing.{one.key}") for one in problems]
+    every = [refused_at(problem, f"casing.{problem.key}") for problem in problems]
     every += [*_seat_problems(case, section, element), *_foot_problems(section, element)]
     for problem in every:
         problem.file = str(nodes if problem.key == "casing.nodes" else file)

@@ -24,18 +24,18 @@ def casing_variables(every: Sequence[Deflection]) -> dict[str, tuple]:
     if casing is None:
         return {}
     station = slice(6 * casing.station, 6 * casing.station + 6)
-    seats = [seat_motions(model.case, casing, one.motion) for one in every]
+    seats = [seat_motions(model.case, casing, state.motion) for state in every]
     return {
         "foot_force": (
             "load_case foot axis",
-            [one.foot_force for one in every],
+            [state.foot_force for state in every],
             "N",
             "force of the foot on the casing",
         ),
         "foot_place": ("foot axis", casing.foot_places, "m", "place of the foot"),
         "casing_motion": (
             "load_case motion",
-            [one.motion[station] for one in every],
+            [state.motion[station] for state in every],
             "m",
             "motion of the casing as a whole, at its centre of mass: x, y, z (m), tilts and rotation (rad)",
         ),

@@ -136,7 +136,7 @@ def _weight(case: GearboxCase) -> Iterator[CaseError]:
 def _names(case: GearboxCase) -> Iterator[CaseError]:
     """One name, one part: of shafts, of loads and bearings, of stages."""
     kinds = {
-        "shaft": [(f"shaft[{i}]", one.name) for i, one in enumerate(case.shaft)],
+        "shaft": [(f"shaft[{i}]", shaft.name) for i, shaft in enumerate(case.shaft)],
         "load, bearing and mass": [
             (f"{kind}[{i}]", one.name)
             for kind in ("load", "bearing", "mass")
@@ -146,7 +146,9 @@ def _names(case: GearboxCase) -> Iterator[CaseError]:
         "stage": [
             (f"{kind}[{i}]", one.name) for kind in ("pair", "planetary") for i, one in enumerate(getattr(case, kind))
         ],
-        "load case": [(f"operation.load_case[{i}]", one.name) for i, one in enumerate(case.operation.load_case)],
+        "load case": [
+            (f"operation.load_case[{i}]", load_case.name) for i, load_case in enumerate(case.operation.load_case)
+        ],
     }
     for kind, entries in kinds.items():
         known: dict[str, str] = {CASING: ""} if kind == "shaft" else {}
@@ -171,9 +173,9 @@ def _references(case: GearboxCase) -> Iterator[CaseError]:
         used += [(f"{kind}[{i}].shaft", one.shaft) for i, one in enumerate(getattr(case, kind))]
     for i, bearing in enumerate(case.bearing):
         used += [(f"bearing[{i}].outer_shaft", bearing.outer_shaft)] if bearing.outer_shaft is not None else []
-    used += [(f"coupling[{i}].between", name) for i, one in enumerate(case.coupling) for name in one.between]
-    used += [(f"pair[{i}].shafts", name) for i, one in enumerate(case.pair) for name in one.shafts]
-    used += [(f"pair[{i}].carrier", one.carrier) for i, one in enumerate(case.pair) if one.carrier is not None]
+    used += [(f"coupling[{i}].between", name) for i, coupling in enumerate(case.coupling) for name in coupling.between]
+    used += [(f"pair[{i}].shafts", name) for i, pair in enumerate(case.pair) for name in pair.shafts]
+    used += [(f"pair[{i}].carrier", pair.carrier) for i, pair in enumerate(case.pair) if pair.carrier is not None]
     for i, stage in enumerate(case.planetary):
         used += [(f"planetary[{i}].{member}", getattr(stage, member)) for member in ("sun", "carrier", "ring")]
     used += [("operation.fixed", name) for name in case.operation.fixed]
@@ -444,7 +446,10 @@ def _stages(case: GearboxCase) -> Iterator[CaseError]:
                     no_faults(teeth_of(stage), _NO_CONTACT, "leave deflection.contact out")
             except FemgearError as error:
                 where = f"{key}.{'teeth' if stage.teeth is not None else 'gears'}"
-                yield from (refused_at(one, f"{where}.{one.key}" if one.key else where) for one in error.problems)
+                yield from (
+                    refused_at(problem, f"{where}.{problem.key}" if problem.key else where)
+                    for problem in error.problems
+                )
 
 
 def _given_once(stage: PairSection | BoxPlanetarySection, key: str) -> CaseError | None:

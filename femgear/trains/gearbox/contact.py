@@ -172,7 +172,7 @@ def displaced(
     ideal, count = no_deviations(gears), gears.n_planets
     moved = [replace(ideal, pin_errors=np.tile(way, (count, 1))) for way in np.eye(2)]
     level = body_separation(ideal, gears, 0.0, back=back)[:, 0]
-    unit = np.array([body_separation(one, gears, 0.0, back=back)[:, 0] - level for one in moved])
+    unit = np.array([body_separation(part, gears, 0.0, back=back)[:, 0] - level for part in moved])
     pins = _of_planets(unit, separation, count)
     return replace(deviations, pin_errors=deviations.pin_errors + pins)
 
@@ -216,7 +216,7 @@ def locate_contact_error(
     line = f", {1e-3 * abs(torque) / width:.4g} N m per mm of its width" if width else ""
     error.message = f"stage {stage.name} with {torque:.6g} N m{line}: {error.message}"
     less = "less torque in the load case"
-    remedies = [less if one == LESS_TORQUE else one for one in error.remedies]
+    remedies = [less if remedy == LESS_TORQUE else remedy for remedy in error.remedies]
     if error.code != "E-SLICES" and isinstance(error, ContactError) and less not in remedies:
         remedies = [less, *remedies]
     error.remedies = tuple(remedies)

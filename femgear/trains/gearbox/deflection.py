@@ -276,16 +276,16 @@ def solve_deflection(
     return replace(found, contacts=contacts, slopes=tuple(history), settled=settled)
 
 
-def shared_torques(found: Deflection) -> Deflection:
+def shared_torques(state: Deflection) -> Deflection:
     """Give stages side by side the torques by which shafts, bearings and meshes share them in a loaded state."""
-    model, factors = found.model, dict[str, float]()
+    model, factors = state.model, dict[str, float]()
     for stage in model.stages:
         torque = abs(model.flow.first_torque(stage.section))
         if torque and any(stage.name in names for names in model.flow.side_by_side):
             normal = stage.sizes.base_radii[0] * math.cos(stage.sizes.base_helix)
-            force = found.mesh_force[list(stage.meshes[: max(len(stage.planets), 1)])].sum()
+            force = state.mesh_force[list(stage.meshes[: max(len(stage.planets), 1)])].sum()
             factors[stage.name] = float(force * normal / torque)
-    return replace(found, model=replace(model, flow=model.flow.with_factors(factors))) if factors else found
+    return replace(state, model=replace(model, flow=model.flow.with_factors(factors))) if factors else state
 
 
 def _contacts(

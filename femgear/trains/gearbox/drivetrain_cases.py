@@ -309,7 +309,10 @@ def gearbox_of_drivetrain(file: DrivetrainFile) -> tuple[dict[str, Any], tuple[F
     tables |= {"shaft": [], "mass": [], "bearing": [], "coupling": []}
     _add_bodies(tables, file, places)
     _add_shafts(tables, file, places)
-    tables |= {"pair": [_pair(stage) for stage in file.parallel], "planetary": [_set(one) for one in file.planetary]}
+    tables |= {
+        "pair": [_pair(stage) for stage in file.parallel],
+        "planetary": [_set(planetary) for planetary in file.planetary],
+    }
     _number([*tables["planetary"], *tables["pair"]])
     if file.gravity is not None:
         tables["gravity"] = {"acceleration": _text(file.gravity.acceleration, "m/s^2")}
@@ -349,17 +352,17 @@ def _unknown_bodies(file: DrivetrainFile) -> Iterator[CaseError]:
             yield CaseError(
                 "two bodies have one name", code="E-DUPLICATE", key=f"body[{i}].name", value=name, remedy=remedy
             )
-    used = [(f"shaft[{i}].between", name) for i, one in enumerate(file.shaft) for name in one.between]
-    used += [(f"parallel[{i}].between", name) for i, one in enumerate(file.parallel) for name in one.between]
+    used = [(f"shaft[{i}].between", name) for i, shaft in enumerate(file.shaft) for name in shaft.between]
+    used += [(f"parallel[{i}].between", name) for i, stage in enumerate(file.parallel) for name in stage.between]
     for i, stage in enumerate(file.planetary):
         used += [(f"planetary[{i}].carrier", stage.carrier), (f"planetary[{i}].sun", stage.sun)]
-    used += [(f"bearing[{i}].body", one.body) for i, one in enumerate(file.bearing) if one.body is not None]
-    used += [(f"operation.torque[{i}].body", one.body) for i, one in enumerate(file.operation.torque)]
+    used += [(f"bearing[{i}].body", bearing.body) for i, bearing in enumerate(file.bearing) if bearing.body is not None]
+    used += [(f"operation.torque[{i}].body", torque.body) for i, torque in enumerate(file.operation.torque)]
     for key, name in used:
         if name not in names:
             limit = ", ".join(names[:20])
             yield CaseError("there is no such body", code="E-CHOICE", key=key, value=name, limit=limit)
-    shafts = {one.between: one.elements for one in file.shaft}
+    shafts = {shaft.between: shaft.elements for shaft in file.shaft}
     for i, bearing in enumerate(file.bearing):
         inside = (bearing.shaft is not None, bearing.station is not None)
         if inside != (bearing.body is None,) * 2:
@@ -420,7 +423,7 @@ def _wrong_sizes(file: DrivetrainFile) -> Iterator[CaseError]:
 
 def _places(file: DrivetrainFile) -> dict[str, tuple[float, float, float]]:
     """Places of all bodies that are joined to the first one [m]."""
-    ways = [(*one.between, (0.0, 0.0, one.length)) for one in file.shaft]
+    ways = [(*shaft.between, (0.0, 0.0, shaft.length)) for shaft in file.shaft]
     for stage in file.parallel:
         distance, (first, second) = stage.axis_distance, stage.offsets
         way = distance * math.cos(stage.direction), distance * math.sin(stage.direction), first - second
@@ -453,7 +456,7 @@ def _add_bodies(tables: dict[str, Any], file: DrivetrainFile, places: Mapping[st
         if bearing.offset:
             seat["position"] = _text(bearing.offset, "m")
         if bearing.body is None:
-            shaft = next(one for one in file.shaft if one.between == bearing.shaft)
+            shaft = next(shaft for shaft in file.shaft if shaft.between == bearing.shaft)
             position = shaft.length * (bearing.station or 0) / shaft.elements + bearing.offset
             seat = {"shaft": shaft.name, "position": _text(position, "m")}
         springs = {"radial": _text(bearing.radial, "N/m"), "tilt": _text(bearing.tilt, "N m/rad")}
@@ -542,7 +545,7 @@ def _set(stage: _PlanetarySection) -> dict[str, Any]:
 
 def _operation(file: DrivetrainFile, speed: Mapping[str, float]) -> dict[str, Any]:
     """Load case of the mean torques; one of them, or the heaviest other body, balances the rest."""
-    given, first = [(one.body, one) for one in file.operation.torque], file.body[0].name
+    given, first = [(torque.body, torque) for torque in file.operation.torque], file.body[0].name
     ratio = {name: value / file.operation.speed or 1.0 for name, value in speed.items()}
     shares = [name for name, one in given if one.share is not None]
     others = [body for body in file.body if body.name not in [name for name, _ in given]]
@@ -598,8 +601,8 @@ def _transient(file: DrivetrainFile, output: str) -> dict[str, Any]:
     for name, unit in (("record", "Hz"), ("settle", "s"), ("resolution", "Hz")):
         if getattr(s, name) is not None:
             entries[name] = _text(getattr(s, name), unit)
-    entries["torque"] = [{"load": one.body, **_torque(one)} for one in file.operation.torque]
-    if output not in [one.body for one in file.operation.torque]:
+    entries["torque"] = [{"load": torque.body, **_torque(torque)} for torque in file.operation.torque]
+    if output not in [torque.body for torque in file.operation.torque]:
         entries["torque"].append({"load": output, "torque": "0.0 N m"})
     return entries
 
@@ -625,12 +628,16 @@ def _without_effect(file: DrivetrainFile) -> Iterator[Finding]:
             text = "the teeth of the pair excite with their whole contact, and their masses add to those of the bodies"
             yield Finding("W-FORMER", f"parallel[{i}].stiffness", text, remedy="take the gears out of the bodies")
     ratios = [
-        (f"parallel[{i}].teeth", one.pitch_radii[1] / one.pitch_radii[0], one.teeth[1] / one.teeth[0])
-        for i, one in enumerate(file.parallel)
+        (f"parallel[{i}].teeth", stage.pitch_radii[1] / stage.pitch_radii[0], stage.teeth[1] / stage.teeth[0])
+        for i, stage in enumerate(file.parallel)
     ]
     ratios += [
-        (f"planetary[{i}].ring_teeth", one.base_radii[2] / one.base_radii[0], one.ring_teeth / one.sun_teeth)
-        for i, one in enumerate(file.planetary)
+        (
+            f"planetary[{i}].ring_teeth",
+            planetary.base_radii[2] / planetary.base_radii[0],
+            planetary.ring_teeth / planetary.sun_teeth,
+        )
+        for i, planetary in enumerate(file.planetary)
     ]
     for key, radii, teeth in ratios:
         if abs(teeth / radii - 1.0) > _REMARK:

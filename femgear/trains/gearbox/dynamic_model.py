@@ -144,9 +144,9 @@ def _linear(box: NonlinearGearbox) -> MechanicalSystem:
     return replace(system, C=np.zeros_like(stiffness), K=stiffness, W=columns, load=load)
 
 
-def _outputs(found: Deflection, box: NonlinearGearbox) -> Iterator[Port]:
+def _outputs(state: Deflection, box: NonlinearGearbox) -> Iterator[Port]:
     """List rotations of all shafts, transmission errors of pairs, and sensors with their accelerations."""
-    model, T = found.model, box.motion
+    model, T = state.model, box.motion
     for shaft in model.case.shaft:
         yield Port(f"{shaft.name}: rotation", "rad", T[6 * model.first[shaft.name] + 5])
     for stage in model.stages:

@@ -69,7 +69,7 @@ def _rigid(coupling: BoxCouplingSection, motions: str) -> bool:
 
 def _held_fast(case: GearboxCase) -> Iterator[str]:
     """Shafts that do not turn, and that nothing or a rigid bearing lets move: they need no mass."""
-    rigid = {one.shaft for one in case.bearing if one.radial is not None and math.isinf(one.radial)}
+    rigid = {bearing.shaft for bearing in case.bearing if bearing.radial is not None and math.isinf(bearing.radial)}
     for name in case.operation.fixed:
         if case.motions == "rotation" or name in rigid:
             yield name

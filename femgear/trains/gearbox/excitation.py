@@ -29,18 +29,18 @@ _RECORD = 2**13
 """Positions of the mesh period; of sets the next multiple of their planets."""
 
 
-def exciting_stages(found: Deflection) -> list[StageModel]:
+def exciting_stages(state: Deflection) -> list[StageModel]:
     """List the stages that excite a gearbox: by their contact, or by the contact ratios of meshes that carry."""
-    model = found.model
+    model = state.model
     return [
         stage
         for stage in model.stages
-        if stage.name in found.contacts or (stage.section.counts_pairs and model.flow.carries(stage.section))
+        if stage.name in state.contacts or (stage.section.counts_pairs and model.flow.carries(stage.section))
     ]
 
 
 def excitation_of(
-    found: Deflection,
+    state: Deflection,
     stage: StageModel,
     rings: Sequence[ElasticRing] = (),
     *,
@@ -51,7 +51,7 @@ def excitation_of(
 
     Parameters
     ----------
-    found : Deflection
+    state : Deflection
         Loaded state.
     stage : StageModel
     rings : sequence of ElasticRing
@@ -64,24 +64,24 @@ def excitation_of(
     for ring in rings:
         if ring.stage is stage:
             return ring.excitation
-    if stage.name in found.contacts:
-        contact = found.contacts[stage.name]
-        rubs = stage_friction(found.model, stage, contact.result.planetary_set) if friction else None
+    if stage.name in state.contacts:
+        contact = state.contacts[stage.name]
+        rubs = stage_friction(state.model, stage, contact.result.planetary_set) if friction else None
         return stage_excitation(contact, rubs, steps=steps)
-    return pair_count_excitation(found.model, stage)
+    return pair_count_excitation(state.model, stage)
 
 
-def constant_excitation(found: Deflection, stage: StageModel, *, steps: Steps | None = None) -> MeshExcitation:
+def constant_excitation(state: Deflection, stage: StageModel, *, steps: Steps | None = None) -> MeshExcitation:
     """Make meshes that excite nothing: of the means of a stage that excites, else of a constant stiffness."""
     count = 512
-    if stage in exciting_stages(found):
-        drive = excitation_of(found, stage, steps=steps)
+    if stage in exciting_stages(state):
+        drive = excitation_of(state, stage, steps=steps)
         means = {
             name: np.repeat(getattr(drive, name).mean(axis=1, keepdims=True), count, axis=1)
             for name in ("stiffness", "deflection", "force")
         }
         return replace(drive, **means, periods=1)
-    contacts = found.model.assembly.contacts
+    contacts = state.model.assembly.contacts
     k = np.repeat([[contacts[mesh].stiffness.sum()] for mesh in stage.meshes], count, axis=1)
     return MeshExcitation(k, 0.0 * k, 0.0 * k, np.zeros(len(k)))
 

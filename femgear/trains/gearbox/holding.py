@@ -75,7 +75,11 @@ def floating_shafts(case: GearboxCase, *, judged: Mapping[str, Sequence[int]]) -
     for bearing in case.bearing:
         if any(senses(bearing)):
             ties.append({_shaft_meant(case, bearing.shaft), _shaft_meant(case, bearing.outer_shaft or CASING)})
-    ties += [set(map(lambda name: _shaft_meant(case, name), one.between)) for one in case.coupling if one.axial]
+    ties += [
+        set(map(lambda name: _shaft_meant(case, name), coupling.between))
+        for coupling in case.coupling
+        if coupling.axial
+    ]
     for number, pair in enumerate(case.pair):
         if number not in judged["pair"] or pair_sizes(pair).base_helix:
             ties.append({_shaft_meant(case, name) for name in pair.shafts})
@@ -90,7 +94,7 @@ def floating_shafts(case: GearboxCase, *, judged: Mapping[str, Sequence[int]]) -
 
 def _floating(case: GearboxCase, numbers: Sequence[int]) -> CaseError:
     names = [case.shaft[i].name for i in numbers]
-    own = [one.name or f"bearing[{i}]" for i, one in enumerate(case.bearing) if one.shaft in names]
+    own = [bearing.name or f"bearing[{i}]" for i, bearing in enumerate(case.bearing) if bearing.shaft in names]
     plural = len(names) > 1
     return CaseError(
         f"shaft{'s' * plural} {', '.join(names)} float{'s' * (not plural)} along the axis: nothing holds "
@@ -107,10 +111,10 @@ def tilting_shafts(case: GearboxCase) -> Iterator[CaseError]:
     """Refuse shafts that tilt: on one bearing of given stiffnesses without tilt, with at most one pair of gears."""
     if case.motions != "space":
         return
-    joined = {name for one in case.coupling for name in one.between}
+    joined = {name for coupling in case.coupling for name in coupling.between}
     joined |= {name for stage in case.planetary for name in (stage.sun, stage.carrier, stage.ring)}
     for shaft in case.shaft:
-        bearings = [one for one in case.bearing if shaft.name in (one.shaft, one.outer_shaft)]
+        bearings = [bearing for bearing in case.bearing if shaft.name in (bearing.shaft, bearing.outer_shaft)]
         pairs = [pair for pair in case.pair if shaft.name in pair.shafts]
         alone = len(bearings) == 1 and bearings[0].kind is None and not bearings[0].tilt
         if alone and len(pairs) < 2 and shaft.name not in joined:
@@ -229,7 +233,7 @@ def _holders(case: GearboxCase) -> tuple[list[tuple[str, str]], list[tuple[float
             ends.append((bearing.shaft, bearing.outer_shaft or CASING))
             # thrust towards +z is held by a force towards -z
             bounds.append((None if positive else 0.0, None if negative else 0.0))
-    ends += [(one.between[0], one.between[1]) for one in case.coupling if one.axial]
+    ends += [(coupling.between[0], coupling.between[1]) for coupling in case.coupling if coupling.axial]
     bounds += [(None, None)] * (len(ends) - len(bounds))
     return ends, bounds
 
@@ -273,7 +277,7 @@ def loose_shafts(case: GearboxCase, owners: Sequence[str], motion: np.ndarray) -
         others = [i for i in ways if i != 5]
         if others or len(ways) == 1:
             problems.append((owner, others or ways))
-    moving = [one for one in problems if one[1] != [5]] or problems
+    moving = [problem for problem in problems if problem[1] != [5]] or problems
     return [_loose(case, owner, ways) for owner, ways in moving]
 
 
@@ -281,7 +285,7 @@ def _loose(case: GearboxCase, owner: str, ways: Sequence[int]) -> CaseError:
     names = [shaft.name for shaft in case.shaft]
     if owner in names:
         key, what = f"shaft[{names.index(owner)}].name", f"shaft {owner}"
-        bearings = [one.name or f"bearing[{i}]" for i, one in enumerate(case.bearing) if one.shaft == owner]
+        bearings = [bearing.name or f"bearing[{i}]" for i, bearing in enumerate(case.bearing) if bearing.shaft == owner]
         value = f"bearings {', '.join(bearings)}" if bearings else "no bearing"
     else:
         stages = [f"planets of {stage.name}" for stage in case.planetary]
@@ -306,7 +310,7 @@ def without_balance(case: GearboxCase, owner: str, way: int, left: float) -> Con
 
     ``owner`` moves the farthest, along or about the ``way`` of `_MOTIONS`; ``left`` is the force out of balance [N].
     """
-    bearings = {i: one for i, one in enumerate(case.bearing) if one.shaft == owner and one.nonlinear}
+    bearings = {i: bearing for i, bearing in enumerate(case.bearing) if bearing.shaft == owner and bearing.nonlinear}
     key, value = "bearing", None
     if bearings:
         i = max(bearings, key=lambda number: bearings[number].clearance)

@@ -77,9 +77,9 @@ def bearing_lives(found: Deflection) -> np.ndarray:
     return lives
 
 
-def turning_speed(found: Deflection, number: int) -> float:
+def turning_speed(state: Deflection, number: int) -> float:
     """Speed of the rings of a bearing relative to each other [turns/s]."""
-    section, speed = found.model.case.bearing[number], found.model.flow.speed
+    section, speed = state.model.case.bearing[number], state.model.flow.speed
     return abs(speed[section.shaft] - speed[section.outer_shaft or CASING]) / (2.0 * math.pi)
 
 

@@ -73,7 +73,7 @@ def _speeds_judged(response: GearboxResponse) -> np.ndarray:
     return np.array(sorted(places))
 
 
-def teeth_frequency(found: Deflection) -> float:
+def teeth_frequency(state: Deflection) -> float:
     """Highest frequency of the modes in which the meshes of an exciting stage have most of their strain energy [Hz].
 
     Of the gearbox about its loaded state; elastic rings and carriers are rigid here. Modes have unit mass, so that the
@@ -81,7 +81,7 @@ def teeth_frequency(found: Deflection) -> float:
 
     Parameters
     ----------
-    found : Deflection
+    state : Deflection
         Loaded state, whose stages with teeth or contact ratios excite.
 
     Returns
@@ -89,13 +89,13 @@ def teeth_frequency(found: Deflection) -> float:
     float
         Zero where nothing excites.
     """
-    assembly, system, stiffness = linear_system(found)
+    assembly, system, stiffness = linear_system(state)
     still = replace(system, gyroscopic=None, load=np.zeros(len(system.dofs)))
     modes = undamped_modes(still, stiffness, damping_ratio=0.0)
     strain = spring_forces(system, stiffness, modes.shape) * (system.W.T @ modes.shape)
     whole = np.maximum((2.0 * math.pi * modes.frequency) ** 2, np.finfo(float).tiny)
     highest = 0.0
-    for stage in exciting_stages(found):
+    for stage in exciting_stages(state):
         energy = np.sum([strain[assembly.slices[mesh]].sum(axis=0) for mesh in stage.meshes], axis=0)
         share = np.where(modes.frequency > 0.0, energy / whole, 0.0)
         highest = max(highest, float(modes.frequency[share.argmax()]))

@@ -262,7 +262,7 @@ class _Builder:
             tuple(self.contacts),
             () if self.elastic is None else self.elastic.followers,
         )
-        ports = {one.name: self.seat(one.shaft, one.position) for one in case.load}
+        ports = {load.name: self.seat(load.shaft, load.position) for load in case.load}
         ports |= {shaft.name: Seat(self.first[shaft.name]) for shaft in case.shaft if not shaft.part}
         turns = [6 * self.first[name] + 5 for name in self.flow.independent]
         load = self._loads(assembly, ports, load_case)
@@ -639,8 +639,8 @@ def seats_on(case: GearboxCase, shaft: str) -> set[float]:
     for bearing in case.bearing:
         if bearing.outer_shaft == shaft and bearing.outer_position is not None:
             found.add(bearing.outer_position)
-    for names, positions in [(one.between, one.positions) for one in case.coupling] + [
-        (one.shafts, one.positions) for one in case.pair
+    for names, positions in [(coupling.between, coupling.positions) for coupling in case.coupling] + [
+        (pair.shafts, pair.positions) for pair in case.pair
     ]:
         found |= {p for name, p in zip(names, positions or (), strict=False) if name == shaft and p is not None}
     for stage in case.planetary:

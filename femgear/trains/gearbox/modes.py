@@ -117,40 +117,40 @@ class GearboxModes:
     at_sensors: np.ndarray
 
 
-def linear_system(found: Deflection) -> tuple[Assembly, MechanicalSystem, np.ndarray]:
+def linear_system(state: Deflection) -> tuple[Assembly, MechanicalSystem, np.ndarray]:
     """Linearise a gearbox about its loaded state: assembly with bearings, system, stiffness (s,) of slices [N/m].
 
     Slices that carry nothing have no stiffness. CaseError: a shaft without mass (E-MASS).
     """
-    model = found.model
+    model = state.model
     check_shafts_have_mass(model.case)
     bearings = []
     for number, law, springs in laws_of(model, model.estimate):
-        tangent = law.share(found.bearing_stiffness[number])
+        tangent = law.share(state.bearing_stiffness[number])
         bearings.append(Beam(springs.stations, springs.rows.T @ tangent @ springs.rows))
     assembly = replace(model.assembly, beams=(*model.assembly.beams, *bearings))
-    return assembly, assembly.system(), _pressed_stiffness(found)
+    return assembly, assembly.system(), _pressed_stiffness(state)
 
 
-def _pressed_stiffness(found: Deflection) -> np.ndarray:
+def _pressed_stiffness(state: Deflection) -> np.ndarray:
     """Stiffness (g,) of the slices: those that carry share that of their mesh; an idle mesh keeps its own [N/m]."""
-    stiffness = found.model.assembly.slice_stiffness.copy()
-    if not np.any(found.model.load):
+    stiffness = state.model.assembly.slice_stiffness.copy()
+    if not np.any(state.model.load):
         return stiffness
     # the forces of an idle mesh are rounding, and would choose its slices by chance
-    least = _IDLE * found.slice_force.max(initial=0.0)
-    for part in found.model.assembly.slices:
-        carrying = found.slice_force[part] > least
+    least = _IDLE * state.slice_force.max(initial=0.0)
+    for part in state.model.assembly.slices:
+        carrying = state.slice_force[part] > least
         if carrying.any() and not carrying.all():
             total = stiffness[part].sum()
             stiffness[part] = np.where(carrying, total / carrying.sum(), 0.0)
     return stiffness
 
 
-def solve_gearbox_modes(found: Deflection, *, steps: Steps | None = None) -> GearboxModes:
+def solve_gearbox_modes(state: Deflection, *, steps: Steps | None = None) -> GearboxModes:
     """Solve for the modes of a gearbox about its loaded state, and follow them over the speed."""
-    model, case = found.model, found.model.case
-    assembly, system, stiffness = linear_system(found)
+    model, case = state.model, state.model.case
+    assembly, system, stiffness = linear_system(state)
     frequencies = [hertz for hertz in model.flow.mesh_frequency.values() if hertz]
     top = case.modes.up_to or (_HARMONICS * max(frequencies) if frequencies else None)
     rings = elastic_rings(model, steps=steps)
@@ -163,7 +163,9 @@ def solve_gearbox_modes(found: Deflection, *, steps: Steps | None = None) -> Gea
     modes = undamped_modes(still, stiffness, damping_ratio=case.modes.damping_ratio, count=kept)
     count = assembly.motions.shape[1]
     motion, waves = assembly.motions @ modes.shape[:count], modes.shape[count:]
-    squares = {ring.name: ring.stiffness for ring in rings} | {one.name: one.frequency**2 for one in carriers}
+    squares = {ring.name: ring.stiffness for ring in rings} | {
+        carrier.name: carrier.frequency**2 for carrier in carriers
+    }
     inner = _inner_energies(squares, waves * (system.M @ modes.shape)[count:])
     moved = assembly.mass @ motion
     for ring, part in zip(rings, _parts(squares), strict=False):
@@ -173,7 +175,7 @@ def solve_gearbox_modes(found: Deflection, *, steps: Steps | None = None) -> Gea
     named = [ring.name for ring in rings], [carrier.name for carrier in carriers]
     members, kinetic, kinds = _kinetic(model, motion, moved, modes, inner, named)
     inner = _inner_energies(squares, waves**2 * np.concatenate([np.zeros(0), *squares.values()])[:, None])
-    parts, strain = _strain(found, assembly, motion, _mesh_energies(system, stiffness, modes), modes, inner)
+    parts, strain = _strain(state, assembly, motion, _mesh_energies(system, stiffness, modes), modes, inner)
     reference = model.flow.independent[0] if model.flow.independent else case.shaft[0].name
     speed = abs(model.flow.speed[reference])
     orders = excitation_orders(model, reference)
@@ -186,7 +188,7 @@ def solve_gearbox_modes(found: Deflection, *, steps: Steps | None = None) -> Gea
     for ring, part in zip(rings, _parts(squares), strict=False):
         at_sensors += ring.sensor_rows(sensors) @ waves[part]
     named = reference, orders, stages, at_sensors
-    return GearboxModes(found, replace(modes, kind=kinds), motion, members, kinetic, parts, strain, followed, *named)
+    return GearboxModes(state, replace(modes, kind=kinds), motion, members, kinetic, parts, strain, followed, *named)
 
 
 def _parts(inner: Mapping[str, np.ndarray]) -> list[slice]:
@@ -289,10 +291,10 @@ def _kinetic(
 
 
 def _strain(
-    found: Deflection, assembly: Assembly, motion, of_meshes, modes: Modes, inner: dict[str, np.ndarray]
+    state: Deflection, assembly: Assembly, motion, of_meshes, modes: Modes, inner: dict[str, np.ndarray]
 ) -> tuple[tuple[str, ...], np.ndarray]:
     """Shares of shafts, bearings, joints, meshes, rings and carriers in the strain energy; none of rigid motions."""
-    model = found.model
+    model = state.model
     energies: dict[str, np.ndarray] = {}
 
     def add(name: str, stations: Sequence[int], matrix: np.ndarray) -> None:
@@ -308,7 +310,7 @@ def _strain(
     for beam in beams[len(model.beams) :]:
         add(CASING, beam.stations, beam.stiffness)
     for number, springs in enumerate(model.bearings):
-        finite = np.where(np.isfinite(found.bearing_stiffness[number]), found.bearing_stiffness[number], 0.0)
+        finite = np.where(np.isfinite(state.bearing_stiffness[number]), state.bearing_stiffness[number], 0.0)
         add(called("bearing", springs.name), springs.stations, springs.rows.T @ finite @ springs.rows)
     for number, springs in enumerate(model.joints):
         finite = np.where(np.isfinite(springs.stiffness), springs.stiffness, 0.0)

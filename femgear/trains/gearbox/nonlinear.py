@@ -136,7 +136,7 @@ class NonlinearGearbox:
 
 
 def nonlinear_gearbox(
-    found: Deflection,
+    state: Deflection,
     excitations: Mapping[str, MeshExcitation],
     *,
     harmonics: int,
@@ -151,7 +151,7 @@ def nonlinear_gearbox(
 
     Parameters
     ----------
-    found : Deflection
+    state : Deflection
         Loaded state.
     excitations : mapping of str to MeshExcitation
         Of the stages whose flanks part, by name, see `femgear.trains.gearbox.stage_structure.stage_excitation`. A
@@ -177,13 +177,13 @@ def nonlinear_gearbox(
     CaseError
         Planets that are not equally spaced, or two, on a carrier that turns (E-TURNING).
     """
-    model = found.model
+    model = state.model
     chosen = [stage for stage in model.stages if stage.name in excitations]
     around = turning_planets(model, chosen) if turning else {}
     carriers = {planets.name: planets for planets in around.values()}
-    assembly, stiffness, load = _structure(found, chosen, carriers.values())
+    assembly, stiffness, load = _structure(state, chosen, carriers.values())
     T = assembly.motions
-    rings = _rings(found, assembly)
+    rings = _rings(state, assembly)
     bases, frequency, staged = list[str](), list[float](), list[NonlinearStage]()
     phases = pair_phases(model.case, model.flow)
     for stage in chosen:
@@ -191,9 +191,9 @@ def nonlinear_gearbox(
         if planets is not None and planets.name not in bases:
             bases.append(planets.name)
             frequency.append(abs(planets.speed))
-        record = _in_time(found, stage, excitations, planets, phases)
+        record = _in_time(state, stage, excitations, planets, phases)
         numbers = len(bases), bases.index(planets.name) if planets is not None else -1
-        made = _stage(found, stage, record, planets, numbers, back=separates and back_flanks)
+        made = _stage(state, stage, record, planets, numbers, back=separates and back_flanks)
         bases.append(f"{stage.name} mesh")
         frequency.append(2.0 * math.pi * model.flow.mesh_frequency[stage.name] / made.excitation.periods)
         staged.append(made)
@@ -216,20 +216,20 @@ def nonlinear_gearbox(
     forces = [
         force
         for stage, made in zip(chosen, staged, strict=True)
-        for force in _friction_forces(found, stage, made, T, harmonics, len(bases))
+        for force in _friction_forces(state, stage, made, T, harmonics, len(bases))
     ]
     problem = NonlinearSystem(system, (*elements, *bearings.values()), tuple(forces))
-    return NonlinearGearbox(found, problem, T, tuple(bases), np.array(frequency), tuple(staged), flanks, bearings)
+    return NonlinearGearbox(state, problem, T, tuple(bases), np.array(frequency), tuple(staged), flanks, bearings)
 
 
 def _friction_forces(
-    found: Deflection, stage: StageModel, made: NonlinearStage, T: np.ndarray, harmonics: int, bases: int
+    state: Deflection, stage: StageModel, made: NonlinearStage, T: np.ndarray, harmonics: int, bases: int
 ) -> Iterator[HarmonicForce]:
     """Friction of a pair about its mean, as with flanks in contact, by motions (6n, m) per unit of the coordinates."""
     if made.excitation.source is None or stage.planets or made.turns:
         return
     columns = np.zeros((len(T), len(made.excitation.source)))
-    for column, row in zip(columns.T, rubbing_rows(found, stage)[0], strict=True):
+    for column, row in zip(columns.T, rubbing_rows(state, stage)[0], strict=True):
         for station, effect in row:
             column[6 * station : 6 * station + 6] += effect
     lines = harmonics_of(made.excitation.source, harmonics * made.excitation.periods)
@@ -237,10 +237,10 @@ def _friction_forces(
         yield HarmonicForce(T.T @ columns @ lines[:, harmonic], orders_of(made.mesh_base, bases, harmonic))
 
 
-def _rings(found: Deflection, assembly: Assembly) -> dict[str, tuple[RadialBearings, np.ndarray]]:
+def _rings(state: Deflection, assembly: Assembly) -> dict[str, tuple[RadialBearings, np.ndarray]]:
     """Bearings with play by name, with their motions across the axis (n, 2) per unit of the coordinates."""
     rings = {}
-    for _, law, springs in laws_of(found.model, found.model.estimate):
+    for _, law, springs in laws_of(state.model, state.model.estimate):
         across = (spread_rows(springs, assembly) @ assembly.motions)[:2].T
         if law.section.gapped and across.any():
             rings[springs.name] = law.ring(np.array([[0, 1]])), across
@@ -248,7 +248,7 @@ def _rings(found: Deflection, assembly: Assembly) -> dict[str, tuple[RadialBeari
 
 
 def _structure(
-    found: Deflection, chosen: Sequence[StageModel], around: Iterable[TurningPlanets]
+    state: Deflection, chosen: Sequence[StageModel], around: Iterable[TurningPlanets]
 ) -> tuple[Assembly, np.ndarray, np.ndarray]:
     """Gearbox with its stiffness (6s, 6s) and load (6s,), the meshes of the chosen stages left out.
 
@@ -256,17 +256,17 @@ def _structure(
     Bearings with play are left out; what else a law of them holds stays. Those of planets that go round have the mean
     of all branches.
     """
-    model = found.model
-    assembly, _, tangents = linear_system(found)
-    stiffness, load, motion = assembly.stiffness, model.load.copy(), found.motion
+    model = state.model
+    assembly, _, tangents = linear_system(state)
+    stiffness, load, motion = assembly.stiffness, model.load.copy(), state.motion
     for number, law, springs in laws_of(model, model.estimate):
-        rows, tangent = spread_rows(springs, assembly), law.share(found.bearing_stiffness[number])
+        rows, tangent = spread_rows(springs, assembly), law.share(state.bearing_stiffness[number])
         force = law.force(rows @ motion)[0]
         if law.section.gapped:
             stiffness = stiffness - rows[:2].T @ tangent[:2, :2] @ rows[:2]
             force[:2], tangent[:2, :2] = 0.0, 0.0
         load += rows.T @ (tangent @ (rows @ motion) - force)
-    for number, change in (pair for planets in around for pair in pin_changes(found, planets).items()):
+    for number, change in (pair for planets in around for pair in pin_changes(state, planets).items()):
         rows = spread_rows(model.bearings[number], assembly)
         stiffness = stiffness + rows.T @ change @ rows
         load += rows.T @ (change @ (rows @ motion))
@@ -275,12 +275,12 @@ def _structure(
         if mesh not in gone:
             W, k = assembly.columns[:, part], tangents[part]
             stiffness = stiffness + (W * k) @ W.T
-            load -= W @ (found.slice_force[part] - k * (W.T @ motion))
+            load -= W @ (state.slice_force[part] - k * (W.T @ motion))
     return assembly, stiffness, load
 
 
 def _in_time(
-    found: Deflection,
+    state: Deflection,
     stage: StageModel,
     excitations: Mapping[str, MeshExcitation],
     planets: TurningPlanets | None,
@@ -291,15 +291,15 @@ def _in_time(
     Of a pair on a carrier that turns those of all its branches.
     """
     if planets is None or planets.branches is None:
-        excitation, _, _ = in_time(found.model, stage, excitations[stage.name])
+        excitation, _, _ = in_time(state.model, stage, excitations[stage.name])
         excitation = ahead(excitation, phases.get(stage.name, 0.0)) if not stage.planets else excitation
-        contacts, count = [found.contacts.get(stage.name)], max(len(stage.planets), 1)
+        contacts, count = [state.contacts.get(stage.name)], max(len(stage.planets), 1)
     else:
         kind = next(n for n, names in enumerate(planets.branches.kinds) if stage.name in names)
-        stages = {other.name: other for other in found.model.stages}
+        stages = {other.name: other for other in state.model.stages}
         alike = [stages[name] for name in planets.branches.kinds[kind]]
-        excitation, _, _ = kinds_in_time(found, planets.branches, [alike], kind, excitations, phases)
-        contacts, count = [found.contacts.get(other.name) for other in alike], len(alike)
+        excitation, _, _ = kinds_in_time(state, planets.branches, [alike], kind, excitations, phases)
+        contacts, count = [state.contacts.get(other.name) for other in alike], len(alike)
     if any(contact is None for contact in contacts):
         return excitation
     approach = np.concatenate([contact.approach for contact in contacts if contact is not None])
@@ -308,7 +308,7 @@ def _in_time(
 
 
 def _stage(
-    found: Deflection,
+    state: Deflection,
     stage: StageModel,
     excitation: MeshExcitation,
     planets: TurningPlanets | None,
@@ -321,7 +321,7 @@ def _stage(
     The excitation and directions are made of all meshes of its kinds, of which a pair among branches has its own.
     ``bases`` are the numbers of the base frequencies of its mesh and of its carrier.
     """
-    assembly, _, tangents = linear_system(found)
+    assembly, _, tangents = linear_system(state)
     meshes, count = stage.meshes, max(len(stage.planets), 1)
     if planets is not None and planets.branches is not None:
         meshes = planets.kind_of(stage.meshes[0])
@@ -333,10 +333,10 @@ def _stage(
     sloping = list[int]()
     for number, mesh in enumerate(meshes):
         contact, part = assembly.contacts[mesh], assembly.slices[mesh]
-        k, force = tangents[part], found.slice_force[part]
+        k, force = tangents[part], state.slice_force[part]
         weight = k / k.sum()
         drive.append(np.einsum("s,gsm->gm", weight, contact.approach))
-        behind.append(np.einsum("s,gsm->gm", weight, _back_approach(contact, _radial(found.model, mesh, number))))
+        behind.append(np.einsum("s,gsm->gm", weight, _back_approach(contact, _radial(state.model, mesh, number))))
         height = contact.heights - weight @ contact.heights
         if float(k @ height**2) > 0.0:
             sloping.append(number)
@@ -347,7 +347,7 @@ def _stage(
     turning = [_directions(assembly, planets, meshes, at, rows) for rows in (drive, behind)]
     sloped = _directions(assembly, planets, meshes, sloping, slope)
     table = np.array(springs).reshape(-1, 3).T
-    table[2] = sloped.at(0.0) @ found.motion
+    table[2] = sloped.at(0.0) @ state.motion
     if count > 1 and table.size:
         # as planets that only the gearbox loads unequally are taken: each as the mean of all
         table = table.reshape(3, -1, count).mean(axis=2).repeat(count, axis=1)

@@ -147,8 +147,10 @@ def _bounds(shaft: BoxShaftSection, where: np.ndarray) -> tuple[np.ndarray, np.n
     places = shaft.start + np.asarray(shaft.places)
     part = np.clip(np.searchsorted(places, 0.5 * (where[:-1] + where[1:])) - 1, 0, len(shaft.part) - 1)
     share = (np.stack([where[:-1], where[1:]], axis=1) - places[part, None]) / np.diff(places)[part, None]
-    bores = np.array([(one.inner_diameter, one.bore_at_end) for one in shaft.part])[part]
-    outer = np.array([(one.outer_diameter, one.end_outer_diameter or one.outer_diameter) for one in shaft.part])[part]
+    bores = np.array([(part.inner_diameter, part.bore_at_end) for part in shaft.part])[part]
+    outer = np.array([(part.outer_diameter, part.end_outer_diameter or part.outer_diameter) for part in shaft.part])[
+        part
+    ]
     return tuple(0.5 * (ends[:, :1] + share * (ends[:, 1:] - ends[:, :1])) for ends in (bores, outer))  # type: ignore
 
 

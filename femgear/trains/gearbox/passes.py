@@ -64,7 +64,7 @@ def next_start(model: GearboxModel, passes: Sequence[ContactPass]) -> MeshPositi
 
 def _both(passes: Sequence[ContactPass]) -> tuple[list[MeshPositions], list[MeshPositions]]:
     """Starts and ends of passes."""
-    return [one.start for one in passes], [one.end for one in passes]
+    return [pass_.start for pass_ in passes], [pass_.end for pass_ in passes]
 
 
 def _widths(model: GearboxModel) -> np.ndarray:

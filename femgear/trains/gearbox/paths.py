@@ -72,23 +72,23 @@ class CasingPaths:
         return (self.sensors @ answer).transpose(2, 1, 0)
 
 
-def casing_paths(found: Deflection) -> CasingPaths | None:
+def casing_paths(state: Deflection) -> CasingPaths | None:
     """List the ways into the casing of a gearbox; None where it stands still or has no sensor.
 
     Parameters
     ----------
-    found : Deflection
+    state : Deflection
         Loaded state, whose stiffnesses count.
     """
-    model, casing = found.model, found.model.casing
+    model, casing = state.model, state.model.casing
     sensors = sensor_rows(model)
     if casing is None or not len(sensors):
         return None
-    assembly, _, slices = linear_system(found)
+    assembly, _, slices = linear_system(state)
     loss = 1.0 + 2j * model.case.modes.damping_ratio
     stations = {*casing.stations, *casing.own.values()}
     places = np.array([6 * station + way for station in casing.stations for way in range(6)])
-    parts = [part for part in _parts(found, assembly, slices) if not stations.isdisjoint(part[1])]
+    parts = [part for part in _parts(state, assembly, slices) if not stations.isdisjoint(part[1])]
     onto = assembly.led[:, places].T
     forces = {name: np.zeros((len(places), assembly.count), complex) for name, *_ in parts}
     rigid = False
@@ -113,14 +113,14 @@ def casing_paths(found: Deflection) -> CasingPaths | None:
 
 
 def _parts(
-    found: Deflection, assembly: Assembly, stiffness: np.ndarray
+    state: Deflection, assembly: Assembly, stiffness: np.ndarray
 ) -> list[tuple[str, Sequence[int], np.ndarray, bool]]:
     """Springs and meshes: name, stations, stiffness matrix (6n, 6n), and whether some of it is rigid.
 
     ``stiffness`` (g,) is that of all slices of the meshes [N/m].
     """
-    model, parts = found.model, []
-    for springs, tangent in zip(model.bearings, found.bearing_stiffness, strict=True):
+    model, parts = state.model, []
+    for springs, tangent in zip(model.bearings, state.bearing_stiffness, strict=True):
         rows = spread_rows(springs, assembly)
         finite = np.where(np.isfinite(tangent), tangent, 0.0)
         parts.append(
@@ -148,8 +148,8 @@ def _casing_alone(
         assembly.names,
         assembly.places,
         assembly.held,
-        tuple(one for one in assembly.inertias if own.issuperset(one.stations)),
-        tuple(one for one in model.assembly.beams if own.issuperset(one.stations)),
+        tuple(inertia for inertia in assembly.inertias if own.issuperset(inertia.stations)),
+        tuple(beam for beam in model.assembly.beams if own.issuperset(beam.stations)),
     )
     stiffness = alone.stiffness
     for springs, values in zip(casing.feet, casing.foot_stiffness, strict=True):
@@ -160,13 +160,13 @@ def _casing_alone(
 
 
 def forces_on_casing(
-    paths: CasingPaths, found: Deflection, stage: str, structured: StructuredStage, response: RunningResponse
+    paths: CasingPaths, state: Deflection, stage: str, structured: StructuredStage, response: RunningResponse
 ) -> np.ndarray:
     """Two-sided forces (Q + 1, S, P, c) of all paths on the casing while a stage excites the gearbox [N, N m].
 
     Of what the stage is taken out of the structure with, its meshes and pins, the forces themselves count.
     """
-    names, model = list(paths.names), found.model
+    names, model = list(paths.names), state.model
     own, pins = f"meshes of {stage}", f"pins of {stage}"
     by_modes = np.einsum("pcn,nm->pcm", paths.forces, structured.motion)
     loss = 1.0 + 2j * model.case.modes.damping_ratio

@@ -235,7 +235,7 @@ def misplaced_branches(case: GearboxCase) -> Iterator[CaseError]:
     for first, *others in alike_branches(case):
         if first.is_free or not others:
             continue
-        step, angles = assembly_step(first.gears), [_beyond(one, first) for one in others]
+        step, angles = assembly_step(first.gears), [_beyond(other, first) for other in others]
         for branch, angle, place in zip(others, angles, nearest_places(step, [0.0, *angles])[1:], strict=True):
             nearest = _TURN * float(place * step)
             missed = abs(angle - nearest) * max(first.gears.teeth.values()) / _TURN

@@ -95,7 +95,7 @@ def carrier_entries(case: GearboxCase, stage: PairSection, key: str) -> Iterator
             remedy="leave the carrier out, or correct the axes",
         )
     for planet in planets:
-        if not any(one.shaft == planet and one.outer_shaft == stage.carrier for one in case.bearing):
+        if not any(bearing.shaft == planet and bearing.outer_shaft == stage.carrier for bearing in case.bearing):
             yield CaseError(
                 f"the planet {planet} turns in no bearing of its carrier",
                 code="E-MECHANISM",

@@ -27,7 +27,7 @@ _WAYS = {"across": (0, 1), "along z": (2,), "against tilting": (3, 4)}
 _MOST_NAMED = 12
 
 
-def slack_bearings(found: Deflection) -> np.ndarray:
+def slack_bearings(state: Deflection) -> np.ndarray:
     """Find the motions of bearings that they hold under load and leave free at this state.
 
     Returns
@@ -35,13 +35,13 @@ def slack_bearings(found: Deflection) -> np.ndarray:
     (b, 6) bool array
         By bearing and motion of the inner ring against the outer one; a bearing counts where its shaft moves freely.
     """
-    slack = np.zeros((len(found.states), 6), bool)
-    laws = laws_of(found.model, found.model.estimate)
-    if not any(_yields(law.held, found.bearing_stiffness[number]) for number, law, _ in laws):
+    slack = np.zeros((len(state.states), 6), bool)
+    laws = laws_of(state.model, state.model.estimate)
+    if not any(_yields(law.held, state.bearing_stiffness[number]) for number, law, _ in laws):
         return slack
-    free = unheld_motions(found)
+    free = unheld_motions(state)
     for number, law, springs in laws:
-        moved = np.abs(spread_rows(springs, found.model.assembly) @ free) * np.array(LEVERS)[:, None]
+        moved = np.abs(spread_rows(springs, state.model.assembly) @ free) * np.array(LEVERS)[:, None]
         slack[number] = (law.held > 0.0) & (moved.max(axis=1, initial=0.0) > _STILL)
     return slack
 
@@ -53,7 +53,7 @@ def _yields(held: np.ndarray, stiffness: np.ndarray) -> bool:
     return bool(values[0] <= _FREE * max(values[-1], 1.0))
 
 
-def unheld_motions(found: Deflection) -> np.ndarray:
+def unheld_motions(state: Deflection) -> np.ndarray:
     """Find the motions that nothing holds at a loaded state, but for the rotations that are given.
 
     Returns
@@ -61,14 +61,14 @@ def unheld_motions(found: Deflection) -> np.ndarray:
     (6n, f) array
         Motions of all stations, each of a size of 1 m, or of 20 rad.
     """
-    assembly, model = found.model.assembly, found.model
+    assembly, model = state.model.assembly, state.model
     held = assembly.held.copy()
     held[model.turns] = True
     T = replace(assembly, held=held).motions
     tangent = assembly.stiffness + (assembly.columns * assembly.slice_stiffness) @ assembly.columns.T
     for number, law, springs in laws_of(model, model.estimate):
         rows = spread_rows(springs, assembly)
-        tangent = tangent + rows.T @ law.share(found.bearing_stiffness[number]) @ rows
+        tangent = tangent + rows.T @ law.share(state.bearing_stiffness[number]) @ rows
     reduced = T.T @ tangent @ T
     size = np.sqrt(np.abs(np.diag(reduced)))
     size[size == 0.0] = size.max(initial=1.0)

@@ -154,13 +154,13 @@ def gearbox_flow(case: GearboxCase, load_case: LoadCaseSection | None = None) ->
         ports[port] = graph.torque[shaft_of[port]] - others
     planets = {stage.name: set_sizes(stage) for stage in case.planetary}
     frequencies = {
-        one.name: stage_frequencies(
-            one,
+        condition.name: stage_frequencies(
+            condition,
             graph.speed,
-            planet_teeth={"planet": planets[one.name].teeth[1]} if one.name in planets else None,
-            planets=len(planets[one.name].planet_angles) if one.name in planets else 0,
+            planet_teeth={"planet": planets[condition.name].teeth[1]} if condition.name in planets else None,
+            planets=len(planets[condition.name].planet_angles) if condition.name in planets else 0,
         )
-        for one in conditions
+        for condition in conditions
     }
     independent = _independent(case, conditions, given["held"], given["joined"], load_case)
     speeds = {**graph.speed, CASING: 0.0}
@@ -184,7 +184,7 @@ def _branches(case: GearboxCase, names: tuple[str, ...]) -> list[tuple[str, ...]
 def flow_entries(case: GearboxCase, load_case: LoadCaseSection) -> dict[str, Any]:
     """Collect what a power flow takes beside shafts, stages and speeds: torques, outputs, held and joined shafts."""
     shaft_of = port_shafts(case)
-    joined = [one.between for one in case.coupling if one.transmits and one.torsion > 0.0]
+    joined = [coupling.between for coupling in case.coupling if coupling.transmits and coupling.torsion > 0.0]
     held = {*case.operation.fixed, *(name for pair in joined if CASING in pair for name in pair if name != CASING)}
     torques: dict[str, float] = {}
     for port, torque in load_case.torque.items():

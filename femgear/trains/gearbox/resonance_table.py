@@ -23,13 +23,13 @@ RESONANCES_SHOWN = 12
 
 
 def resonance_variables(
-    found: GearboxResponse, resonances: GearboxResonances, moved: Mapping[str, np.ndarray]
+    response: GearboxResponse, resonances: GearboxResonances, moved: Mapping[str, np.ndarray]
 ) -> dict[str, tuple]:
     """Collect the variables of runup.nc on the resonances between its speeds; none without any.
 
     Parameters
     ----------
-    found : GearboxResponse
+    response : GearboxResponse
         At the speeds of the run-up.
     resonances : GearboxResonances
     moved : mapping of str to (v, s, L) array
@@ -39,14 +39,14 @@ def resonance_variables(
     kept = first[np.argsort(resonances.speed[first], kind="stable")]
     if not len(kept):
         return {}
-    places = np.abs(found.speed - resonances.speed[kept, None]).argmin(axis=1)
-    at, stages = "resonance", {stage.name: stage for stage in found.stages}
+    places = np.abs(response.speed - resonances.speed[kept, None]).argmin(axis=1)
+    at, stages = "resonance", {stage.name: stage for stage in response.stages}
     variables = {
-        "resonance_speed": (at, resonances.speed[kept] / RPM, "rpm", f"speed of {found.reference} at the resonance"),
+        "resonance_speed": (at, resonances.speed[kept] / RPM, "rpm", f"speed of {response.reference} at the resonance"),
         "resonance_stage": (at, [resonances.stage[i] for i in kept], "1", "stage whose mesh harmonic meets the mode"),
         "resonance_harmonic": (at, resonances.harmonic[kept], "1", "mesh harmonic that meets the mode"),
         "resonance_frequency": (at, resonances.frequency[kept], "Hz", "natural frequency of the mode"),
-        "resonance_nearest": (at, found.speed[places] / RPM, "rpm", "speed of the run-up that is nearest"),
+        "resonance_nearest": (at, response.speed[places] / RPM, "rpm", "speed of the run-up that is nearest"),
     }
     if any(part.shape[1] for part in moved.values()):
         levels = []

@@ -115,11 +115,11 @@ class GearboxResponseResult(StageResult):
             "axis": (("axis",), list("xyz"), "1", "coordinate"),
         }
         if sensors:
-            coords["sensor"] = (("sensor",), [one.name for one in gearbox_sensors(model.case)], "1", "sensor")
+            coords["sensor"] = (("sensor",), [sensor.name for sensor in gearbox_sensors(model.case)], "1", "sensor")
         if found.paths:
             coords["path"] = (("path",), list(found.paths), "1", "way into the casing")
         if feet:
-            coords["foot"] = (("foot",), [one.name for one in feet], "1", "foot of the casing")
+            coords["foot"] = (("foot",), [foot.name for foot in feet], "1", "foot of the casing")
         attrs = {
             "title": "response of the gearbox to its stages",
             "up_to": found.up_to,
@@ -134,33 +134,33 @@ class GearboxResponseResult(StageResult):
         return Contents(variables, {name: entry for name, entry in coords.items() if name in used}, attrs)
 
 
-def _at_sensors(found: GearboxResponse, moved: dict[str, np.ndarray]) -> dict[str, tuple]:
+def _at_sensors(response: GearboxResponse, moved: dict[str, np.ndarray]) -> dict[str, tuple]:
     """Levels, shares of stages and ways, and lines at the sensors, of accelerations by stage."""
-    lines = np.concatenate([moved[stage.name] for stage in found.stages], axis=2)
-    by_stage = np.stack([_rms(moved[stage.name]) for stage in found.stages], axis=2)
+    lines = np.concatenate([moved[stage.name] for stage in response.stages], axis=2)
+    by_stage = np.stack([_rms(moved[stage.name]) for stage in response.stages], axis=2)
     return {
-        "level": ("speed sensor", level(found, moved), "m/s^2", "root mean square of the acceleration"),
+        "level": ("speed sensor", level(response, moved), "m/s^2", "root mean square of the acceleration"),
         "level_of_stage": ("speed sensor stage", by_stage, "m/s^2", "the same by the lines of one stage"),
         "outer_level": (
             "speed sensor stage",
-            _outer_levels(found, moved),
+            _outer_levels(response, moved),
             "1",
             "share of the power of the level at the outermost side bands of a stage, of sensors off its ring",
         ),
-        **_of_paths(found, moved),
+        **_of_paths(response, moved),
         **_complex("lines", "speed sensor line", lines, "m/s^2", "acceleration, amplitude of the line"),
     }
 
 
-def _outer_levels(found: GearboxResponse, moved: dict[str, np.ndarray]) -> np.ndarray:
+def _outer_levels(response: GearboxResponse, moved: dict[str, np.ndarray]) -> np.ndarray:
     """Share (v, s, stages) of the power of levels at the outermost side bands of mesh forces, and beyond these.
 
     Zero of sensors on the ring of the stage: planets that pass make side bands there, however few the forces have.
     """
-    case = found.deflection.model.case
-    sensors, whole = gearbox_sensors(case), level(found, moved)
-    shares = np.zeros((*whole.shape, len(found.stages)))
-    for number, stage in enumerate(found.stages):
+    case = response.deflection.model.case
+    sensors, whole = gearbox_sensors(case), level(response, moved)
+    shares = np.zeros((*whole.shape, len(response.stages)))
+    for number, stage in enumerate(response.stages):
         off = [i for i, sensor in enumerate(sensors) if sensor.ring != stage.name]
         outer = _rms(moved[stage.name][..., np.abs(stage.side_band) >= case.dynamics.side_bands])
         shares[:, off, number] = ((outer / np.where(whole > 0.0, whole, 1.0)) ** 2)[:, off]
@@ -171,7 +171,9 @@ def _by_friction(found: GearboxResponse, without: GearboxResponse, sensors: int,
     """Change by friction of the levels at sensors, without any of bearing forces, on rigid bearings of meshes [dB]."""
     every, forces = (found, without), slice(sensors, sensors + 3 * bearings)
     if not sensors:
-        each = (level(response, {one.name: one.motion[:, forces] for one in response.stages}) for response in every)
+        each = (
+            level(response, {stage.name: stage.motion[:, forces] for stage in response.stages}) for response in every
+        )
         change = _decibels(*(np.sqrt((size.reshape(-1, bearings, 3) ** 2).sum(axis=2)) for size in each))
         if np.isfinite(change).any():
             text = "added by friction to the fluctuation of the bearing force; NaN of rigid bearings"
@@ -205,50 +207,50 @@ def _decibels(level_with: np.ndarray, level_without: np.ndarray) -> np.ndarray:
         return 20.0 * np.log10(level_with / level_without)
 
 
-def _stages_of_meshes(found: GearboxResponse) -> list[str]:
+def _stages_of_meshes(response: GearboxResponse) -> list[str]:
     """Names of the exciting stages of all meshes."""
-    names = {mesh: stage.name for stage in found.stages for mesh in stage.meshes}
-    return [names.get(mesh, "") for mesh in range(len(found.deflection.model.assembly.contacts))]
+    names = {mesh: stage.name for stage in response.stages for mesh in stage.meshes}
+    return [names.get(mesh, "") for mesh in range(len(response.deflection.model.assembly.contacts))]
 
 
-def _of_several(found: GearboxResponse) -> dict[str, tuple]:
+def _of_several(response: GearboxResponse) -> dict[str, tuple]:
     """Forces that stages make in the meshes of one another."""
-    if len(found.stages) < 2:
+    if len(response.stages) < 2:
         return {}
     by_stage = "root mean square of the force of the mesh about its mean by the excitation of the stage"
     cross = "force of k(t) of the stage on the motion by another one, over the dynamic force of its meshes"
     return {
-        "mesh_force_by_stage": ("speed mesh stage", found.mesh_forces, "N", by_stage),
-        "cross_excitation": ("speed stage other_stage", found.cross_excitation, "1", cross),
+        "mesh_force_by_stage": ("speed mesh stage", response.mesh_forces, "N", by_stage),
+        "cross_excitation": ("speed stage other_stage", response.cross_excitation, "1", cross),
     }
 
 
-def _of_paths(found: GearboxResponse, moved: dict[str, np.ndarray]) -> dict[str, tuple]:
+def _of_paths(response: GearboxResponse, moved: dict[str, np.ndarray]) -> dict[str, tuple]:
     """Shares (v, s, P) of the ways into the casing in the power of the acceleration at all sensors."""
-    if not found.paths:
+    if not response.paths:
         return {}
-    stages = [stage for stage in found.stages if stage.paths is not None]
+    stages = [stage for stage in response.stages if stage.paths is not None]
     parts = {
-        stage.name: -((stage.order * found.speed[:, None])[:, None, None] ** 2) * stage.paths
+        stage.name: -((stage.order * response.speed[:, None])[:, None, None] ** 2) * stage.paths
         for stage in stages
         if stage.paths is not None
     }
-    size = (len(found.speed), len(found.paths), next(iter(moved.values())).shape[1])
+    size = (len(response.speed), len(response.paths), next(iter(moved.values())).shape[1])
     flat = {name: part.reshape(size[0], -1, part.shape[-1]) for name, part in parts.items()}
-    whole, each = by_order(found, moved), by_order(found, flat)
+    whole, each = by_order(response, moved), by_order(response, flat)
     each = each.reshape(*size, -1)
     power = np.real(each * whole[:, None].conj()).sum(axis=-1)
     total = np.maximum((np.abs(whole) ** 2).sum(axis=-1), np.finfo(float).tiny)
     share = power / total[:, None]
     # what a ring does beyond its seat comes by none of these paths
-    share[..., [bool(sensor.ring) for sensor in gearbox_sensors(found.deflection.model.case)]] = np.nan
+    share[..., [bool(sensor.ring) for sensor in gearbox_sensors(response.deflection.model.case)]] = np.nan
     text = "share of the path in the power of the acceleration; negative where it quietens others, NaN on a ring"
     return {"path_share": ("speed path sensor", share, "1", text)}
 
 
-def _rigid_bodies(found: GearboxResponse) -> list[str]:
+def _rigid_bodies(response: GearboxResponse) -> list[str]:
     """Name the carriers whose own modes the modes of the gearbox have, and the response has not."""
-    stages = found.deflection.model.stages
+    stages = response.deflection.model.stages
     return [stage.elastic_carrier.name for stage in stages if stage.elastic_carrier is not None]
 
 
@@ -260,48 +262,48 @@ def _rms(lines: np.ndarray) -> np.ndarray:
     return np.sqrt(0.5 * (np.abs(lines) ** 2).sum(axis=-1))
 
 
-def _by_kind(found: GearboxResponse, values: Callable[[StageLines], np.ndarray]) -> np.ndarray:
+def _by_kind(response: GearboxResponse, values: Callable[[StageLines], np.ndarray]) -> np.ndarray:
     """Values (v, stages, 2) of the kinds of meshes of all stages; NaN where a pair has no second mesh."""
-    whole = np.full((len(found.speed), len(found.stages), 2), np.nan)
-    for number, stage in enumerate(found.stages):
+    whole = np.full((len(response.speed), len(response.stages), 2), np.nan)
+    for number, stage in enumerate(response.stages):
         own = values(stage)
         whole[:, number, : own.shape[1]] = own
     return whole
 
 
-def _factors(found: GearboxResponse) -> np.ndarray:
+def _factors(response: GearboxResponse) -> np.ndarray:
     """Largest mesh forces over their means (v, stages, 2)."""
-    return _by_kind(found, lambda stage: stage.force[..., 1] / stage.force[..., 0])
+    return _by_kind(response, lambda stage: stage.force[..., 1] / stage.force[..., 0])
 
 
-def _of_stages(found: GearboxResponse) -> dict[str, tuple]:
+def _of_stages(response: GearboxResponse) -> dict[str, tuple]:
     """Mesh forces and figures of the solutions, stage by stage."""
 
     def figures(name: str) -> np.ndarray:
-        return np.stack([getattr(stage, name) for stage in found.stages], axis=1)
+        return np.stack([getattr(stage, name) for stage in response.stages], axis=1)
 
     return {
         "dynamic_factor": (
             "speed stage kind",
-            _factors(found),
+            _factors(response),
             "1",
             "largest mesh force over its mean; NaN where a pair has no second mesh",
         ),
         "lowest_force": (
             "speed stage kind",
-            _by_kind(found, lambda stage: stage.force[..., 2]),
+            _by_kind(response, lambda stage: stage.force[..., 2]),
             "N",
             "smallest mesh force along the normal; below zero real flanks part",
         ),
         "mean_force": (
             "speed stage kind",
-            _by_kind(found, lambda stage: stage.force[..., 0]),
+            _by_kind(response, lambda stage: stage.force[..., 0]),
             "N",
             "mean mesh force along the normal",
         ),
         "mesh_force_rms": (
             "speed stage kind",
-            _by_kind(found, lambda stage: stage.dynamic_force),
+            _by_kind(response, lambda stage: stage.dynamic_force),
             "N",
             "root mean square of the mesh force about its mean",
         ),
@@ -314,17 +316,17 @@ def _of_stages(found: GearboxResponse) -> dict[str, tuple]:
     }
 
 
-def _of_lines(found: GearboxResponse) -> dict[str, tuple]:
+def _of_lines(response: GearboxResponse) -> dict[str, tuple]:
     """Origin and order of all lines."""
 
     def joined(values) -> np.ndarray:
-        return np.concatenate([values(stage) for stage in found.stages])
+        return np.concatenate([values(stage) for stage in response.stages])
 
     return {
-        "order": ("line", joined(lambda stage: stage.order), "1", f"frequency over that of {found.reference}"),
+        "order": ("line", joined(lambda stage: stage.order), "1", f"frequency over that of {response.reference}"),
         "origin": (
             "line",
-            [stage.name for stage in found.stages for _ in stage.order],
+            [stage.name for stage in response.stages for _ in stage.order],
             "1",
             "stage that makes the line",
         ),
@@ -333,17 +335,17 @@ def _of_lines(found: GearboxResponse) -> dict[str, tuple]:
     }
 
 
-def _by_longer(found: GearboxResponse, longer: GearboxResponse, moved: dict[str, np.ndarray]) -> dict[str, tuple]:
+def _by_longer(response: GearboxResponse, longer: GearboxResponse, moved: dict[str, np.ndarray]) -> dict[str, tuple]:
     """Largest mesh forces with a longer excitation, and the change of levels by it; NaN where it was not solved."""
-    places = np.searchsorted(found.speed, longer.speed)
-    factor = np.full((len(found.speed), len(found.stages), 2), np.nan)
+    places = np.searchsorted(response.speed, longer.speed)
+    factor = np.full((len(response.speed), len(response.stages), 2), np.nan)
     factor[places] = _factors(longer)
     text = "dynamic_factor with excitation up to the frequency compared_to; NaN at speeds that were not looked at"
     variables: dict[str, tuple] = {"longer_dynamic_factor": ("speed stage kind", factor, "1", text)}
-    if not (sensors := len(gearbox_sensors(found.deflection.model.case))):
+    if not (sensors := len(gearbox_sensors(response.deflection.model.case))):
         return variables
-    change = np.full((len(found.speed), sensors), np.nan)
-    change[places] = _decibels(level(longer, accelerations(longer, sensors)), level(found, moved)[places])
+    change = np.full((len(response.speed), sensors), np.nan)
+    change[places] = _decibels(level(longer, accelerations(longer, sensors)), level(response, moved)[places])
     text = "change of the level with excitation up to the frequency compared_to; NaN at speeds that were not looked at"
     return variables | {"level_change": ("speed sensor", change, "dB", text)}
 

@@ -127,20 +127,20 @@ class DeflectionResult(StageResult):
         case, state, every = self.case, self.state, self.states
         assembly, load_case, mesh = state.model.assembly, "load_case", "load_case mesh"
         shown = state.model.places
-        slopes, widths = np.array([one.mesh_slope for one in every]), _mesh_widths(state)
-        face = np.array([_face_factors(one) for one in every])
+        slopes, widths = np.array([state.mesh_slope for state in every]), _mesh_widths(state)
+        face = np.array([_face_factors(state) for state in every])
         variables = {
             "speed": ("load_case shaft", _speeds(every, case) / RPM, "rpm", "speed of the shaft"),
             "torque": ("load_case port", _torques(every), "N m", "torque from outside, reactions of outputs too"),
             "mesh_frequency": ("load_case stage", _of_stages(every, "mesh_frequency"), "Hz", "mesh frequency"),
             "planet_load_factor": (
                 "load_case stage",
-                [[_planet_factor(one, stage) for stage in one.model.stages] for one in every],
+                [[_planet_factor(state, stage) for stage in state.model.stages] for state in every],
                 "1",
                 "K_gamma: largest load of the planets over their mean; NaN of pairs without planets",
             ),
             "share": (load_case, running_shares(case.operation.load_case), "1", "share of the running time"),
-            "mesh_force": (mesh, [one.mesh_force for one in every], "N", "force along the normal of the flanks"),
+            "mesh_force": (mesh, [state.mesh_force for state in every], "N", "force along the normal of the flanks"),
             "mesh_slope": (mesh, slopes, "rad", "slope of the approach along the width, closer at z > 0 positive"),
             "mesh_misalignment": (
                 mesh,
@@ -159,23 +159,28 @@ class DeflectionResult(StageResult):
             "transmission_error": (mesh, _errors(every), "m", "peak to peak of the static transmission error"),
             "displacement": (
                 "load_case station motion",
-                np.array([one.motion.reshape(-1, 6)[shown] for one in every]),
+                np.array([state.motion.reshape(-1, 6)[shown] for state in every]),
                 "m",
                 "motion of the station: x, y, z (m), tilts and rotation (rad)",
             ),
             "place": ("station axis", assembly.places[shown], "m", "place of the station"),
-            "passes": (load_case, [len(one.slopes) - 1 for one in every], "1", "passes of contact and system"),
-            "settled": (load_case, [one.settled for one in every], "1", "whether slopes and mesh forces have settled"),
-            "out_of_balance": (load_case, [one.residual for one in every], "1", "force out of balance, relative"),
+            "passes": (load_case, [len(state.slopes) - 1 for state in every], "1", "passes of contact and system"),
+            "settled": (
+                load_case,
+                [state.settled for state in every],
+                "1",
+                "whether slopes and mesh forces have settled",
+            ),
+            "out_of_balance": (load_case, [state.residual for state in every], "1", "force out of balance, relative"),
         }
         variables |= _of_bearings(every, state) | _distribution(state) | _of_estimates(self.estimates)
         variables |= casing_variables(every) | static_sensor_variables(every) | _shares_side_by_side(every)
         coords = {
-            "load_case": _names("load_case", [one.name for one in case.operation.load_case], "load case"),
-            "shaft": _names("shaft", [one.name for one in case.shaft], "shaft"),
+            "load_case": _names("load_case", [load_case.name for load_case in case.operation.load_case], "load case"),
+            "shaft": _names("shaft", [shaft.name for shaft in case.shaft], "shaft"),
             "port": _names("port", [*state.model.flow.port_torque], "load"),
-            "stage": _names("stage", [one.name for one in state.model.stages], "stage"),
-            "mesh": _names("mesh", [one.name for one in assembly.contacts], "gear mesh"),
+            "stage": _names("stage", [stage.name for stage in state.model.stages], "stage"),
+            "mesh": _names("mesh", [contact.name for contact in assembly.contacts], "gear mesh"),
             "bearing": _names("bearing", state.model.bearing_names, "bearing"),
             "motion": _names("motion", MOTIONS, "motion"),
             "other_motion": _names("other_motion", MOTIONS, "motion"),
@@ -200,22 +205,22 @@ def _names(dim: str, names: Iterable[str], words: str) -> tuple:
 
 
 def _speeds(states, case: GearboxCase) -> np.ndarray:
-    return np.array([[one.model.flow.speed[shaft.name] for shaft in case.shaft] for one in states])
+    return np.array([[state.model.flow.speed[shaft.name] for shaft in case.shaft] for state in states])
 
 
 def _torques(states) -> np.ndarray:
     ports = [*states[0].model.flow.port_torque]
-    return np.array([[one.model.flow.port_torque.get(port, 0.0) for port in ports] for one in states])
+    return np.array([[state.model.flow.port_torque.get(port, 0.0) for port in ports] for state in states])
 
 
 def _of_stages(states, name: str) -> np.ndarray:
     return np.array(
-        [[getattr(one.model.flow, name)[stage.name] for stage in one.model.stages] for one in states]
+        [[getattr(state.model.flow, name)[stage.name] for stage in state.model.stages] for state in states]
     ).reshape(len(states), -1)
 
 
 def _mesh_stiffness(states) -> np.ndarray:
-    return np.array([[contact.stiffness.sum() for contact in one.model.assembly.contacts] for one in states])
+    return np.array([[contact.stiffness.sum() for contact in state.model.assembly.contacts] for state in states])
 
 
 def _mesh_widths(state: Deflection) -> np.ndarray:
@@ -243,7 +248,7 @@ def _approaches(states) -> np.ndarray:
     pitch = np.ones(len(states[0].model.assembly.contacts))
     for stage in states[0].model.stages:
         pitch[list(stage.meshes)] = 2.0 * math.pi * stage.sizes.base_radii[0] / stage.sizes.teeth[0]
-    return np.array([one.mesh_force for one in states]) / _mesh_stiffness(states) / pitch
+    return np.array([state.mesh_force for state in states]) / _mesh_stiffness(states) / pitch
 
 
 def _planet_factor(state: Deflection, stage: StageModel) -> float:
@@ -271,7 +276,7 @@ def _errors(states) -> np.ndarray:
 def _of_bearings(every: Sequence[Deflection], state: Deflection) -> dict[str, tuple]:
     """Forces, motions, stiffness and lives of all bearings in all load cases."""
     bearing, count = "load_case bearing", len(state.model.case.bearing)
-    forces = np.array([one.bearing_force for one in every]).reshape(len(every), count, 6)
+    forces = np.array([state.bearing_force for state in every]).reshape(len(every), count, 6)
     return {
         "bearing_force": (f"{bearing} motion", forces, "N", "force on the shaft (N), moments about x, y, z (N m)"),
         "radial_force": (bearing, np.hypot(forces[..., 0], forces[..., 1]), "N", "radial bearing force"),
@@ -284,14 +289,14 @@ def _of_bearings(every: Sequence[Deflection], state: Deflection) -> dict[str, tu
         ),
         "bearing_displacement": (
             "load_case bearing axis",
-            np.array([bearing_motions(one.model, one.motion) for one in every]),
+            np.array([bearing_motions(state.model, state.motion) for state in every]),
             "m",
             "motion of the shaft at the bearing",
         ),
         "bearing_place": ("bearing axis", bearing_places(state.model), "m", "place of the bearing"),
         "slack": (
             f"{bearing} motion",
-            np.array([slack_bearings(one) for one in every]).reshape(len(every), count, 6).astype(float),
+            np.array([slack_bearings(state) for state in every]).reshape(len(every), count, 6).astype(float),
             "1",
             "1 where the bearing holds no such motion for want of load and its shaft is free; else 0",
         ),
@@ -303,8 +308,8 @@ def _of_estimates(states: Sequence[Deflection]) -> dict[str, tuple]:
     """What other stiffnesses of estimated bearings make of the chosen load case."""
     if not states:
         return {}
-    misaligned = np.array([one.mesh_slope * _mesh_widths(one) for one in states])
-    face = np.array([_face_factors(one) for one in states])
+    misaligned = np.array([state.mesh_slope * _mesh_widths(state) for state in states])
+    face = np.array([_face_factors(state) for state in states])
     return {
         "estimate_factor": ("estimate", list(ESTIMATES), "1", "factor on the stiffness of estimated bearings"),
         "estimate_misalignment": ("estimate mesh", misaligned, "m", "misalignment with that factor"),
@@ -379,8 +384,13 @@ class GearboxModesResult(StageResult):
                 "Hz",
                 "natural frequency over the speed",
             ),
-            "critical_speed": ("crossing", [one.speed / RPM for one in critical], "rpm", "speed of a line on a branch"),
-            "critical_frequency": ("crossing", [one.frequency for one in critical], "Hz", "frequency there"),
+            "critical_speed": (
+                "crossing",
+                [crossing.speed / RPM for crossing in critical],
+                "rpm",
+                "speed of a line on a branch",
+            ),
+            "critical_frequency": ("crossing", [crossing.frequency for crossing in critical], "Hz", "frequency there"),
         }
         variables |= modal_sensor_variables(model, found.at_sensors)
         coords = {

@@ -66,21 +66,21 @@ class GearboxResonances:
 
 
 def gearbox_resonances(
-    found: Deflection, slowest: float, fastest: float, *, steps: Steps | None = None
+    state: Deflection, slowest: float, fastest: float, *, steps: Steps | None = None
 ) -> GearboxResonances:
     """Find the resonances of a gearbox between two speeds of its reference shaft.
 
     Parameters
     ----------
-    found : Deflection
+    state : Deflection
         Loaded state.
     slowest, fastest : float
         Ends of the run-up [rad/s].
     steps : Steps, optional
         What other computations have left: excitations of the stages.
     """
-    model, case = found.model, found.model.case
-    assembly, system, stiffness = linear_system(found)
+    model, case = state.model, state.model.case
+    assembly, system, stiffness = linear_system(state)
     rings, count = elastic_rings(model, steps=steps), len(system.dofs)
     system, stiffness = with_rings(system, stiffness, assembly, dict(enumerate(assembly.slices)), rings)
     still = replace(system, gyroscopic=None, load=np.zeros(len(system.dofs)))
@@ -92,12 +92,12 @@ def gearbox_resonances(
         count += len(ring.stiffness)
     up_to, nominal = case.dynamics.up_to, abs(model.flow.speed[reference_shaft(model)])
     parts, names, joint = [np.zeros((5, 0))], list[str](), joint_names(case)
-    for stage in exciting_stages(found):
-        excitation = excitation_of(found, stage, rings, steps=steps)
+    for stage in exciting_stages(state):
+        excitation = excitation_of(state, stage, rings, steps=steps)
         mesh_turns = model.flow.mesh_frequency[stage.name] / nominal
         if not mesh_turns > 0.0:
             continue
-        own_modes = _with_meshes(modes, found, stage, stiffness, excitation.stiffness.mean(axis=1))
+        own_modes = _with_meshes(modes, state, stage, stiffness, excitation.stiffness.mean(axis=1))
         most = excitation.stiffness.shape[1] // (2 * excitation.periods) - 1
         most = min(case.dynamics.mesh_harmonics or _MOST, most)
         harmonics = int(np.clip(up_to / (mesh_turns * slowest), 1, most))
@@ -112,11 +112,11 @@ def gearbox_resonances(
     return GearboxResonances(speed, heard, damping, tuple(names), harmonic.astype(int), frequency)
 
 
-def _with_meshes(modes: Modes, found: Deflection, stage: StageModel, stiffness: np.ndarray, mean: np.ndarray) -> Modes:
+def _with_meshes(modes: Modes, state: Deflection, stage: StageModel, stiffness: np.ndarray, mean: np.ndarray) -> Modes:
     """Modes with the meshes of one stage alone: mean stiffness (M,) [N/m], approach that of all slices by theirs."""
     approach = np.zeros((len(stage.meshes), len(modes.frequency)))
     for row, mesh in zip(approach, stage.meshes, strict=True):
-        part = found.model.assembly.slices[mesh]
+        part = state.model.assembly.slices[mesh]
         row[:] = stiffness[part] @ modes.mesh_deflection[part] / max(stiffness[part].sum(), math.ulp(0.0))
     return replace(modes, mesh_stiffness=mean, mesh_deflection=approach)
 

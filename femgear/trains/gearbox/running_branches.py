@@ -76,7 +76,7 @@ class _Point:
 
 
 def branch_stage(
-    found: Deflection,
+    state: Deflection,
     running: RunningSet,
     kind: int,
     excitations: Mapping[str, MeshExcitation],
@@ -87,7 +87,7 @@ def branch_stage(
 
     Parameters
     ----------
-    found : Deflection
+    state : Deflection
         Loaded state of the gearbox.
     running : RunningSet
         The branches.
@@ -100,19 +100,19 @@ def branch_stage(
     rings : sequence of ElasticRing
         Of other stages.
     """
-    model = found.model
+    model = state.model
     stages = {stage.name: stage for stage in model.stages}
     kinds = [[stages[name] for name in names] for names in running.kinds]
     stations = [branch_stations(model, branch.planets) for branch in running.branches]
     gone, meshes = {at for own in stations for at in own}, {s.meshes[0] for names in kinds for s in names}
-    modes, motion, inner = structure_modes(found, structure_apart(found, gone, meshes, rings), rings)
+    modes, motion, inner = structure_modes(state, structure_apart(state, gone, meshes, rings), rings)
     frequencies = [model.flow.mesh_frequency[names[0].name] for names in kinds]
     together = kinds_together(model, running, kind)
     order = [*together, *(n for n in range(len(kinds)) if n not in together)]
-    first = _Branch(found, running, stations[0])
+    first = _Branch(state, running, stations[0])
     points, of_mesh = first.meshes([kinds[n] for n in order])
     pins, of_pin = first.pins()
-    excitation, paths, sense = kinds_in_time(found, running, [kinds[n] for n in together], kind, excitations, phases)
+    excitation, paths, sense = kinds_in_time(state, running, [kinds[n] for n in together], kind, excitations, phases)
     mean = excitation.stiffness.mean(axis=1).reshape(len(together), -1).mean(axis=1)
     stiffness = np.array([one.stiffness for one in (*points, *pins)])
     stiffness[: len(together)] = mean
@@ -124,9 +124,11 @@ def branch_stage(
     rubbing = None
     if excitation.source is not None:
         rubbed = first.rubbing([kinds[n] for n in together])
-        rows += [one.row for one in rubbed]
-        sliding = np.array([shape_waves(one.row, orbit, motion, model.assembly.places) for one in rubbed])
-        rubbing = RubbingPoints(sliding, np.array([one.approach for one in rubbed]).T[free])
+        rows += [rubbing_row.row for rubbing_row in rubbed]
+        sliding = np.array(
+            [shape_waves(rubbing_row.row, orbit, motion, model.assembly.places) for rubbing_row in rubbed]
+        )
+        rubbing = RubbingPoints(sliding, np.array([rubbing_row.approach for rubbing_row in rubbed]).T[free])
     mass, gyroscopic, elastic = first.matrices(2.0 * math.pi * frequencies[kind])
     turning = np.kron(np.eye(2 * len(stations[0])), _SENSE)
     both = np.ix_(free, free)
@@ -205,11 +207,11 @@ def branch_stations(model: GearboxModel, planets: Sequence[str]) -> list[int]:
 class _Branch:
     """The first branch of a set: its contact points and matrices, along axes that are radial at its first planet."""
 
-    def __init__(self, found: Deflection, running: RunningSet, stations: Sequence[int]):
-        self.found, self.running, self.model = found, running, found.model
+    def __init__(self, state: Deflection, running: RunningSet, stations: Sequence[int]):
+        self.found, self.running, self.model = state, running, state.model
         self.place = {station: n for n, station in enumerate(stations)}
         self.size = 6 * len(stations)
-        assembly, _, self.tangents = linear_system(found)
+        assembly, _, self.tangents = linear_system(state)
         self.assembly = assembly
         self.free = np.flatnonzero(~assembly.held.reshape(-1, 6)[list(stations)].ravel())
         self.axes = np.kron(np.eye(2), pin_axes(running.angles[0]))
@@ -298,7 +300,7 @@ class _Branch:
 
 
 def kinds_in_time(
-    found: Deflection,
+    state: Deflection,
     running: RunningSet,
     kinds: Sequence[Sequence[StageModel]],
     kind: int,
@@ -312,7 +314,7 @@ def kinds_in_time(
     """
     own = {*running.kinds[kind]}
     count = max(excitations[name].stiffness.shape[1] for name in own if name in excitations)
-    records = [[_record(found, stage, excitations, phases, count, stage.name in own) for stage in row] for row in kinds]
+    records = [[_record(state, stage, excitations, phases, count, stage.name in own) for stage in row] for row in kinds]
     every = [record for row in records for record in row]
     stiffness, deflection, force = (
         np.concatenate([getattr(record, name) for record in every]) for name in ("stiffness", "deflection", "force")
@@ -322,10 +324,10 @@ def kinds_in_time(
         # both points of every mesh, point by point, kind by kind and branch by branch
         source = np.concatenate([record.source[way : way + 1] for way in (0, 1) for record in every])  # type: ignore[index]
     excitation = MeshExcitation(stiffness, deflection, force, np.zeros(len(every)), source=source)
-    speed = found.model.flow.speed[running.branches[0].carrier]
+    speed = state.model.flow.speed[running.branches[0].carrier]
     sense = -1 if speed < 0.0 else 1
     paths = MeshPaths(1, running.angles)
-    if are_unequal(found.model.case, running):
+    if are_unequal(state.model.case, running):
         return excitation, paths, sense
     steps = [phases[row[n].name] - phases[row[0].name] for row in kinds for n in range(len(row))]
     teeth = _teeth(running.angles, np.array(steps), sense)
@@ -349,7 +351,7 @@ def _teeth(angles: Sequence[float], steps: np.ndarray, sense: int) -> int | None
 
 
 def _record(
-    found: Deflection,
+    state: Deflection,
     stage: StageModel,
     excitations: Mapping[str, MeshExcitation],
     phases: Mapping[str, float],
@@ -357,9 +359,9 @@ def _record(
     excites: bool,
 ) -> MeshExcitation:
     """Excitation of a pair over a mesh period, with its phase; of one that varies alone without its static part."""
-    flow, section = found.model.flow, stage.section
+    flow, section = state.model.flow, stage.section
     assert isinstance(section, PairSection) and section.carrier is not None
-    k = found.model.assembly.contacts[stage.meshes[0]].stiffness.sum()
+    k = state.model.assembly.contacts[stage.meshes[0]].stiffness.sum()
     nothing = np.zeros((1, count))
     record = excitations.get(stage.name)
     if record is None or record.periods != 1 or record.stiffness.shape[1] != count:

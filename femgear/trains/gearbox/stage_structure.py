@@ -65,7 +65,7 @@ def stage_excitation(
     """
     case, static, steps = contact.case, contact.result, steps or Steps()
     moved = contact.deviations.planet_misalignment, contact.deviations.pin_errors
-    known = {"teeth": case.source, "moved": tuple(np.concatenate([one.ravel() for one in moved]).tolist())}
+    known = {"teeth": case.source, "moved": tuple(np.concatenate([part.ravel() for part in moved]).tolist())}
     known |= {"friction": friction}
     if (kept := steps.kept("excitation of a stage", known)) is not None:
         return kept
@@ -152,13 +152,13 @@ class StructuredStage:
 
 
 def running_stage(
-    found: Deflection, stage: StageModel, excitation: MeshExcitation, rings: Sequence[ElasticRing] = ()
+    state: Deflection, stage: StageModel, excitation: MeshExcitation, rings: Sequence[ElasticRing] = ()
 ) -> StructuredStage:
     """Take a stage out of a gearbox: its planets and meshes, and the modes of the structure without it.
 
     Parameters
     ----------
-    found : Deflection
+    state : Deflection
         Loaded state of the gearbox.
     stage : StageModel
         With teeth.
@@ -169,12 +169,12 @@ def running_stage(
     """
     ring = next((ring for ring in rings if ring.stage.name == stage.name), None)
     joined = tuple(other.with_structure if other is ring else other for other in rings)
-    modes, motion, inner = structure_modes(found, structure_without(found, stage, joined), joined)
-    damping = found.model.case.modes.damping_ratio
+    modes, motion, inner = structure_modes(state, structure_without(state, stage, joined), joined)
+    damping = state.model.case.modes.damping_ratio
     section = stage.section
     planetary = isinstance(section, BoxPlanetarySection)
-    rows, stiffness, points = _mesh_rows(found, stage)
-    excitation, paths, sense = in_time(found.model, stage, excitation)
+    rows, stiffness, points = _mesh_rows(state, stage)
+    excitation, paths, sense = in_time(state.model, stage, excitation)
     mean = excitation.stiffness.mean(axis=1)
     kinds = len(mean) // max(len(stage.planets), 1)
     stiffness[:kinds] = mean.reshape(kinds, -1).mean(axis=1)
@@ -182,18 +182,18 @@ def running_stage(
     flexibility, free, of_meshes = None, np.zeros(0, int), [True] * len(rows)
     if planetary:
         first = 6 * stage.planets[0]
-        free = np.flatnonzero(~found.model.assembly.held[first : first + 6])
+        free = np.flatnonzero(~state.model.assembly.held[first : first + 6])
         used = free[planet_bearing(section)[free] > 0.0]
-        pins, springs, flexibility = _pin_rows(found.model, stage, used, len(rows))
+        pins, springs, flexibility = _pin_rows(state.model, stage, used, len(rows))
         rows, stiffness, of_meshes = [*rows, *pins], np.append(stiffness, springs), of_meshes + [False] * len(pins)
         points = np.vstack([points, np.eye(6)[used]])
-        mass, gyroscopic, turning = _planet(found.model, stage)
-    orbit = _orbit(stage, found.model.assembly.places)
-    shape = np.array([shape_waves(row, orbit, motion, found.model.assembly.places) for row in rows])
+        mass, gyroscopic, turning = _planet(state.model, stage)
+    orbit = _orbit(stage, state.model.assembly.places)
+    shape = np.array([shape_waves(row, orbit, motion, state.model.assembly.places) for row in rows])
     waves, rubbing = None, None
     if excitation.source is not None:
-        rubbed, sliding = rubbing_rows(found, stage)
-        of_friction = np.array([shape_waves(row, orbit, motion, found.model.assembly.places) for row in rubbed])
+        rubbed, sliding = rubbing_rows(state, stage)
+        of_friction = np.array([shape_waves(row, orbit, motion, state.model.assembly.places) for row in rubbed])
         rows, of_meshes = [*rows, *rubbed], of_meshes + [True] * len(rubbed)
         rubbing = RubbingPoints(of_friction, sliding.T[free])
     if ring is not None:
@@ -232,7 +232,7 @@ def _orbit(stage: StageModel, places: np.ndarray) -> Orbit | None:
 
 
 def structure_modes(
-    found: Deflection, structure: tuple[Assembly, MechanicalSystem, np.ndarray], joined: Sequence[ElasticRing]
+    state: Deflection, structure: tuple[Assembly, MechanicalSystem, np.ndarray], joined: Sequence[ElasticRing]
 ) -> tuple[Modes, np.ndarray, tuple[RingInStructure, ...]]:
     """Modes of a structure, the motions (6n, m) of all stations by them [kg^-1/2], and elastic rings in it.
 
@@ -244,7 +244,7 @@ def structure_modes(
     motion, inner = assembly.motions @ modes.shape[:count], list[RingInStructure]()
     pressed = spring_forces(system, slices, modes.shape)
     for other in joined:
-        names = {found.model.assembly.contacts[mesh].name for mesh in other.stage.meshes}
+        names = {state.model.assembly.contacts[mesh].name for mesh in other.stage.meshes}
         ours = [part for part, contact in zip(assembly.slices, assembly.contacts, strict=True) if contact.name in names]
         pushed = -sum((assembly.columns[:, part] @ pressed[part] for part in ours), np.zeros_like(motion))
         inner.append(RingInStructure(other, modes.shape[count : count + len(other.stiffness)], pushed))
@@ -277,7 +277,7 @@ def _with_bodies(flexibility: np.ndarray | None, between: np.ndarray, planets: i
 
 
 def structure_without(
-    found: Deflection, stage: StageModel, rings: Sequence[ElasticRing] = ()
+    state: Deflection, stage: StageModel, rings: Sequence[ElasticRing] = ()
 ) -> tuple[Assembly, MechanicalSystem, np.ndarray]:
     """Take planets, pins and meshes of a stage out of the linear gearbox; stiffness (g,) of the slices left [N/m].
 
@@ -285,12 +285,12 @@ def structure_without(
     """
     carrier = stage.elastic_carrier
     gone = {*stage.planets, *(carrier.stations[1:] if carrier else ())}
-    rigid = [_rigid_carrier(found.model, stage)] if carrier is not None and carrier.stations[0] != GROUND else []
-    return structure_apart(found, gone, stage.meshes, rings, rigid)
+    rigid = [_rigid_carrier(state.model, stage)] if carrier is not None and carrier.stations[0] != GROUND else []
+    return structure_apart(state, gone, stage.meshes, rings, rigid)
 
 
 def structure_apart(
-    found: Deflection,
+    state: Deflection,
     gone: Set[int],
     meshes: Collection[int],
     rings: Sequence[ElasticRing] = (),
@@ -300,7 +300,7 @@ def structure_apart(
 
     Parameters
     ----------
-    found : Deflection
+    state : Deflection
         Loaded state.
     gone, meshes : set and collection of int
         Numbers of stations and of contacts.
@@ -309,7 +309,7 @@ def structure_apart(
     added : sequence of Inertia
         In the place of what is gone.
     """
-    assembly, _, stiffness = linear_system(found)
+    assembly, _, stiffness = linear_system(state)
     held = assembly.held.copy()
     for station in gone:
         held[6 * station : 6 * station + 6] = True
@@ -317,10 +317,10 @@ def structure_apart(
     rest = replace(
         assembly,
         held=held,
-        inertias=(*(one for one in assembly.inertias if gone.isdisjoint(one.stations)), *added),
-        beams=tuple(one for one in assembly.beams if gone.isdisjoint(one.stations)),
-        springs=tuple(one for one in assembly.springs if gone.isdisjoint(one.stations)),
-        contacts=tuple(one for i, one in enumerate(assembly.contacts) if i not in meshes),
+        inertias=(*(inertia for inertia in assembly.inertias if gone.isdisjoint(inertia.stations)), *added),
+        beams=tuple(beam for beam in assembly.beams if gone.isdisjoint(beam.stations)),
+        springs=tuple(spring for spring in assembly.springs if gone.isdisjoint(spring.stations)),
+        contacts=tuple(contact for i, contact in enumerate(assembly.contacts) if i not in meshes),
     )
     system, first, slices = rest.system(), 0, dict[int, slice]()
     for number, part in enumerate(assembly.slices):
@@ -340,13 +340,13 @@ def _rigid_carrier(model: GearboxModel, stage: StageModel) -> Inertia:
     return Inertia(carrier.stations[:1], rigid.T @ carrier.mass @ rigid, polar)
 
 
-def _mesh_rows(found: Deflection, stage: StageModel) -> tuple[list[Row], np.ndarray, np.ndarray]:
+def _mesh_rows(state: Deflection, stage: StageModel) -> tuple[list[Row], np.ndarray, np.ndarray]:
     """Springs of the leading meshes: what they do to the structure, stiffness, and approach (.., 6) of the planet.
 
     First the approach of the flanks along the normal, then the slope of the approach along the width, of each mesh
     that has slices. The former is that of all slices by their stiffness. Axes of the planet are radial, tangential, z.
     """
-    assembly, _, tangents = linear_system(found)
+    assembly, _, tangents = linear_system(state)
     stiffness = equal_planets(assembly, stage.meshes, max(len(stage.planets), 1), tangents)
     count = max(len(stage.planets), 1)
     approach, slope = [], []
@@ -383,13 +383,13 @@ def springs_of_mesh(
     return (mean, float(stiffness.sum())), (tilt, float(stiffness @ height**2))
 
 
-def rubbing_rows(found: Deflection, stage: StageModel) -> tuple[list[Row], np.ndarray]:
+def rubbing_rows(state: Deflection, stage: StageModel) -> tuple[list[Row], np.ndarray]:
     """Find the points at which friction of the leading meshes acts, along their tangents, then as couples.
 
     What they do to the structure, and sliding (F, 6) of the planet along its radial, tangential and z axes: that of all
     slices by their stiffness.
     """
-    assembly, _, tangents = linear_system(found)
+    assembly, _, tangents = linear_system(state)
     stiffness = equal_planets(assembly, stage.meshes, max(len(stage.planets), 1), tangents)
     axes = np.kron(np.eye(2), pin_axes(stage.angles[0])) if stage.planets else np.eye(6)
     rows, of_planet = list[Row](), list[np.ndarray]()
@@ -487,7 +487,7 @@ def shape_waves(row: Row, orbit: Orbit | None, motion: np.ndarray, places: np.nd
 def _planet(model: GearboxModel, stage: StageModel) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Mass, gyroscopic and turning matrices (6, 6) of a planet along its own axes, see `RunningStage`."""
     station = stage.planets[0]
-    parts = [one for one in model.assembly.inertias if one.stations == (station,)]
+    parts = [inertia for inertia in model.assembly.inertias if inertia.stations == (station,)]
     mass, gyroscopic = sum(one.mass for one in parts), sum(one.gyroscopic for one in parts)
     frequency = 2.0 * math.pi * model.flow.mesh_frequency[stage.name]
     turning = np.asarray(block_diag(_TURNING, _TURNING))

@@ -145,9 +145,9 @@ def why_no_stress(case: GearboxCase) -> str:
     return ""
 
 
-def _stage_stress(found: Deflection, name: str, key: str, meshes: tuple[str, ...]) -> StageStress:
+def _stage_stress(state: Deflection, name: str, key: str, meshes: tuple[str, ...]) -> StageStress:
     """Find the stresses of the teeth of a stage under the contact of the loaded state."""
-    contact = found.contacts[name]
+    contact = state.contacts[name]
     data = solve_stress(contact.case, contact.result).dataset()
     data["largest_pressure"] = _largest_pressure(data)
     if "slice" in data.sizes:  # slices have the pressure of Hertz, kinks or not

@@ -103,7 +103,7 @@ class GearboxInTime:
 
 
 def gearbox_in_time(
-    found: Deflection, transient: TransientSection, *, steps: Steps | None = None, mean_damping: bool = True
+    state: Deflection, transient: TransientSection, *, steps: Steps | None = None, mean_damping: bool = True
 ) -> GearboxInTime:
     """Make a gearbox ready for integration in time about its loaded state.
 
@@ -112,11 +112,11 @@ def gearbox_in_time(
     CaseError: planets that are not equally spaced on a carrier that turns (E-TURNING), several motions that nothing
     holds (E-MECHANISM), a stiffness that is not positive (E-STIFFNESS).
     """
-    model = found.model
-    excitations = all_excitations(found, steps=steps)
+    model = state.model
+    excitations = all_excitations(state, steps=steps)
     known: dict[str, Any] = {"harmonics": transient.harmonics, "separates": transient.contact_loss}
     known["mean_damping"] = mean_damping
-    box = nonlinear_gearbox(found, excitations, **known, back_flanks=transient.back_flanks, turning=transient.turning)
+    box = nonlinear_gearbox(state, excitations, **known, back_flanks=transient.back_flanks, turning=transient.turning)
     shaft = reference_shaft(model)
     system = box.problem.system
     made = GearboxInTime(box, _without_contacts(box), shaft)
@@ -133,14 +133,14 @@ def gearbox_in_time(
     return replace(made, spun=spun)
 
 
-def all_excitations(found: Deflection, *, steps: Steps | None = None) -> Mapping[str, MeshExcitation]:
+def all_excitations(state: Deflection, *, steps: Steps | None = None) -> Mapping[str, MeshExcitation]:
     """Compute what the meshes of all stages excite with; those of a constant stiffness are springs of it."""
-    exciting = [stage.name for stage in exciting_stages(found)]
+    exciting = [stage.name for stage in exciting_stages(state)]
     return {
-        stage.name: excitation_of(found, stage, steps=steps)
+        stage.name: excitation_of(state, stage, steps=steps)
         if stage.name in exciting or stage.section.counts_pairs
-        else constant_excitation(found, stage, steps=steps)
-        for stage in found.model.stages
+        else constant_excitation(state, stage, steps=steps)
+        for stage in state.model.stages
     }
 
 
@@ -231,6 +231,6 @@ def _check_sense(model: GearboxInTime, run: MarchedRun, shafts: tuple[str, ...])
     )
 
 
-def torsional_state(found: Deflection, *, steps: Steps | None = None) -> Deflection:
+def torsional_state(state: Deflection, *, steps: Steps | None = None) -> Deflection:
     """Solve for the loaded state of a gearbox that has rotations alone."""
-    return solve_deflection(found.model.case.model_copy(update={"motions": "rotation"}), steps=steps)
+    return solve_deflection(state.model.case.model_copy(update={"motions": "rotation"}), steps=steps)

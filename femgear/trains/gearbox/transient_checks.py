@@ -135,7 +135,11 @@ def turning_inertia(model: GearboxModel, shaft: str) -> float:
     """Compute the inertia of a gearbox that turns as a rigid chain [kg m^2]; infinite where it is held."""
     case, flow = model.case, model.flow
     held = any(bearing.torsional for bearing in case.bearing if bearing.outer_shaft is None)
-    braked = (one for one in case.coupling if not one.transmits and one.torsion and math.isfinite(one.torsion))
+    braked = (
+        coupling
+        for coupling in case.coupling
+        if not coupling.transmits and coupling.torsion and math.isfinite(coupling.torsion)
+    )
     if held or any(CASING in one.between for one in braked) or not flow.speed[shaft]:
         return math.inf
     motion = np.zeros((len(model.assembly.names), 6))

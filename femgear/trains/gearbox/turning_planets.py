@@ -182,7 +182,10 @@ def turning_terms(
     displacement = np.zeros_like(velocity)
     for planets in turning:
         Z, speed = wave_generator(planets, assembly.count), planets.speed
-        own = replace(assembly, inertias=tuple(one for one in assembly.inertias if one.stations[0] in planets.stations))
+        own = replace(
+            assembly,
+            inertias=tuple(inertia for inertia in assembly.inertias if inertia.stations[0] in planets.stations),
+        )
         mass = assembly.mass
         displacement += speed**2 * Z @ own.mass @ Z + centrifugal_pull(assembly, planets, own.mass)
         if gyroscopic:
@@ -237,14 +240,14 @@ def _cross(vector: np.ndarray) -> np.ndarray:
     return np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
 
 
-def pin_changes(found: Deflection, planets: TurningPlanets) -> dict[int, np.ndarray]:
+def pin_changes(state: Deflection, planets: TurningPlanets) -> dict[int, np.ndarray]:
     """What has to be added to the stiffness (6, 6) of bearings, by number, for the mean of all branches [N/m, N m/rad].
 
     Where planets stand, weight and bending shafts may press their bearings unequally.
     """
     changes, axes = dict[int, np.ndarray](), planets.axes
     for numbers in planets.bearings.T.tolist():
-        tangents = [np.where(np.isinf(found.bearing_stiffness[n]), 0.0, found.bearing_stiffness[n]) for n in numbers]
+        tangents = [np.where(np.isinf(state.bearing_stiffness[n]), 0.0, state.bearing_stiffness[n]) for n in numbers]
         along = [turned @ tangent @ turned.T for turned, tangent in zip(axes, tangents, strict=True)]
         mean = np.mean(along, axis=0)
         for number, turned, tangent in zip(numbers, axes, tangents, strict=True):
