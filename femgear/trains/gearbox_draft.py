@@ -116,14 +116,14 @@ def _bearings(case: Any, width: float, notes: dict[str, str]) -> list[dict[str, 
     """Tables of two bearings for each shaft, of which the left one takes thrust."""
     modulus = case.material.youngs_modulus
     stiffness = STIFFNESS.show(float(f"{_BEARING * estimated_mesh_stiffness(modulus, modulus, width):.3g}"))
-    found: list[dict[str, Any]] = []
+    bearings: list[dict[str, Any]] = []
     for shaft, (left, right) in zip(_NAMES, ("AB", "CD"), strict=True):
         for name, place in ((left, 0.5), (right, FACE_WIDTHS - 0.5)):
             bearing = {"name": name, "shaft": shaft, "position": LENGTH.show(place * width), "radial": stiffness}
             if name == left:
                 bearing["axial"] = stiffness
-                notes[f"bearing[{len(found)}].axial"] = "this one takes thrust both ways"
-            notes[f"bearing[{len(found)}].radial"] = f"estimated: {_BEARING:g} of 20 N/(mm um) times the face width"
-            notes[f"bearing[{len(found)}].estimated"] = "results show what half and twice of it make"
-            found.append(bearing | {"estimated": True})
-    return found
+                notes[f"bearing[{len(bearings)}].axial"] = "this one takes thrust both ways"
+            notes[f"bearing[{len(bearings)}].radial"] = f"estimated: {_BEARING:g} of 20 N/(mm um) times the face width"
+            notes[f"bearing[{len(bearings)}].estimated"] = "results show what half and twice of it make"
+            bearings.append(bearing | {"estimated": True})
+    return bearings

@@ -134,10 +134,10 @@ def _load_cases(operation: Any, driver: str, driven: str) -> dict[str, Any]:
     if not operation.load_case:
         return {"load_case": [loaded(operation.torque, (operation.speeds or (0.0,))[0])]}
     load_cases = [
-        {"name": _load_case_name(number, one)}
-        | loaded(one.torque, one.speed)
-        | ({"share": one.share} if one.hours is None else {"hours": one.hours})
-        for number, one in enumerate(operation.load_case)
+        {"name": _load_case_name(number, load_case)}
+        | loaded(load_case.torque, load_case.speed)
+        | ({"share": load_case.share} if load_case.hours is None else {"hours": load_case.hours})
+        for number, load_case in enumerate(operation.load_case)
     ]
     hours = {} if operation.required_hours is None else {"required_hours": operation.required_hours}
     return {"load_case": load_cases, "first": 1 + _nearest_load_case(operation)} | hours

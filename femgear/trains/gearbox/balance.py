@@ -140,16 +140,16 @@ def solve_balance(state: Deflection, *, steps: Steps | None = None, progress: Pr
             drive = replace(drive, force=drive.force - drive.force.mean(axis=1, keepdims=True) + mean)
         drives = {stage.name: drive}
         if wanted.together:
-            others = (one for one in state.model.stages if one is not stage)
+            others = (member for member in state.model.stages if member is not stage)
             drives |= {other.name: constant_excitation(state, other, steps=steps) for other in others}
-        known: dict[str, Any] = {"harmonics": wanted.harmonics, "back_flanks": wanted.back_flanks}
-        box = nonlinear_gearbox(state, drives, **known)
+        options: dict[str, Any] = {"harmonics": wanted.harmonics, "back_flanks": wanted.back_flanks}
+        box = nonlinear_gearbox(state, drives, **options)
         names = [stage.name for stage in box.stages]
         solution = _solved(box, wanted, names.index(stage.name))
         solved.append(_moving(box, solution, names.index(stage.name)))
         if not number:
-            silent_stages = [one for one in names if one not in {exciting.name for exciting in stages}]
-            solved += [_moving(box, solution, names.index(one), excites=False) for one in silent_stages]
+            silent_stages = [member for member in names if member not in {exciting.name for exciting in stages}]
+            solved += [_moving(box, solution, names.index(member), excites=False) for member in silent_stages]
     return solved
 
 
@@ -286,20 +286,20 @@ def _deflections(
     box: NonlinearGearbox, solution: PeriodicSolution, place: int
 ) -> Iterator[tuple[np.ndarray, np.ndarray]]:
     """Deflections (I, n_columns) [m] and phases (I, n_bases) [rad] at one angle of the carrier after the other."""
-    own, turns = box.stages[place], np.zeros((1, len(box.frequency)))
-    others = [stage.turn_base for stage in box.stages if stage.turns and stage is not own]
-    if own.turns or others:
+    stage_of_place, turns = box.stages[place], np.zeros((1, len(box.frequency)))
+    others = [stage.turn_base for stage in box.stages if stage.turns and stage is not stage_of_place]
+    if stage_of_place.turns or others:
         angles = np.arange(_TURNS * (_ANGLES if others else 1))
         turns = np.zeros((len(angles), len(box.frequency)))
-        if own.turns:
-            turns[:, own.turn_base] = angles / _TURNS
+        if stage_of_place.turns:
+            turns[:, stage_of_place.turn_base] = angles / _TURNS
         for number, base in enumerate(others, 1):
             turns[:, base] = angles * _STEP**number
     # instants are those of the mesh that excites
     exciting = [stage.mesh_base for stage in box.stages if solution.orders[:, stage.mesh_base].any()]
     for turn in turns:
         theta = np.tile(2.0 * np.pi * (turn % 1.0), (_INSTANTS, 1))
-        theta[:, exciting or [own.mesh_base]] = 2.0 * np.pi * np.arange(_INSTANTS)[:, None] / _INSTANTS
+        theta[:, exciting or [stage_of_place.mesh_base]] = 2.0 * np.pi * np.arange(_INSTANTS)[:, None] / _INSTANTS
         yield np.real(np.exp(1j * theta @ solution.orders.T) @ solution.deflection.T), theta
 
 

@@ -186,7 +186,7 @@ def planet_springs(
     for number, (offset, along) in enumerate(zip(offsets, axes, strict=True)):
         part = slice(6 * number, 6 * number + 6)
         turned[part, part] = np.kron(np.eye(2), along)
-        first, second = (6 * stations.index(one) for one in (holders[number], planets[number]))
+        first, second = (6 * stations.index(end) for end in (holders[number], planets[number]))
         rows[part, first : first + 6] = -turned[part, part] @ rigid_link(offset)
         rows[part, second : second + 6] = turned[part, part]
     kept = (6 * np.arange(count)[:, None] + used).ravel()

@@ -201,10 +201,10 @@ class BoxShaftSection(Section):
     @property
     def places(self) -> tuple[float, ...]:
         """Ends of the parts from the left end [m]."""
-        found = [0.0]
+        ends_of_parts = [0.0]
         for part in self.part:
-            found.append(found[-1] + part.length)
-        return tuple(found)
+            ends_of_parts.append(ends_of_parts[-1] + part.length)
+        return tuple(ends_of_parts)
 
 
 class SeatSection(Section):
@@ -740,21 +740,21 @@ def teeth_of(stage: PairSection | BoxPlanetarySection) -> Any:
 
 def embed_stages(data: dict, name: str) -> dict[str, str]:
     """Put tables of stages and torques in the place of their files, and the SHA-256 of the files of a casing."""
-    found = add_checksum(data, "casing", name, "casing") | embed_torques(data, name)
+    file_names = add_checksum(data, "casing", name, "casing") | embed_torques(data, name)
     for kind in ("pair", "planetary"):
         stages = data.get(kind)
         for i, table in enumerate(stages if isinstance(stages, list) else ()):
             if isinstance(table, dict) and isinstance(table.get("teeth"), str):
                 key, file = f"{kind}[{i}].teeth", table.pop("teeth")
                 table["teeth"] = embedded(file, name, key, stage_tables)
-                found[key] = case_text.printable(file)
+                file_names[key] = case_text.printable(file)
             body = table.get("carrier_body") if isinstance(table, dict) else None
             if isinstance(body, dict) and isinstance(body.get("file"), str):
                 key, file = f"{kind}[{i}].carrier_body.file", body["file"]
                 del table["carrier_body"]  # a file that cannot be read is refused for that alone
                 table["carrier_body"] = _superelement_tables(body, name, key)
-                found[key] = case_text.printable(file)
-    return found
+                file_names[key] = case_text.printable(file)
+    return file_names
 
 
 def _there(path: str) -> Path:

@@ -131,9 +131,9 @@ def inertia_tensor(section: BoxCasingSection) -> np.ndarray:
 def casing_mass(section: BoxCasingSection) -> np.ndarray:
     """Mass matrix (6, 6) of a rigid casing about its centre of mass [kg, kg m^2]."""
     assert section.mass is not None
-    found = section.mass * np.eye(6)
-    found[3:, 3:] = inertia_tensor(section)
-    return found
+    mass = section.mass * np.eye(6)
+    mass[3:, 3:] = inertia_tensor(section)
+    return mass
 
 
 def casing_model(case: GearboxCase, station: int) -> CasingModel:
@@ -154,10 +154,10 @@ def casing_model(case: GearboxCase, station: int) -> CasingModel:
 
 def foot_stiffness(case: GearboxCase, given: Sequence[Sequence[float]]) -> np.ndarray:
     """Arrange the stiffnesses (f, 3) of feet [N/m] as those (f, 6) of joints."""
-    found = np.zeros((len(given), 6))
+    stiffness = np.zeros((len(given), 6))
     # weight along held motions rests in these
-    found[:, :3] = np.where([True, True, case.motions == "space"], np.reshape(given, (-1, 3)), 0.0)
-    return found
+    stiffness[:, :3] = np.where([True, True, case.motions == "space"], np.reshape(given, (-1, 3)), 0.0)
+    return stiffness
 
 
 def _foot_rows(casing: CasingModel, count: int) -> np.ndarray:
@@ -191,10 +191,10 @@ def check_casing_held(motion: np.ndarray, levers: np.ndarray, station: int, coun
     ``levers`` (6n,) compare tilts and rotations with shifts; ``count`` motions are free in all.
     """
     size = np.abs(motion) * levers[:, None]
-    own = size[6 * station : 6 * station + 6]
-    if own.max() <= _STILL * size.max():
+    of_casing = size[6 * station : 6 * station + 6]
+    if of_casing.max() <= _STILL * size.max():
         return
-    way, _ = np.unravel_index(int(own.argmax()), own.shape)
+    way, _ = np.unravel_index(int(of_casing.argmax()), of_casing.shape)
     raise CaseError(
         f"nothing holds {count} motion{'s' * (count > 1)}: {CASING} ({MOTIONS[way]}) with what sits in it",
         code="E-MECHANISM",

@@ -48,8 +48,8 @@ def casing_element(case: GearboxCase) -> Superelement:
         refuse_other_files((file, nodes), section.file or "", section.sha256)
         element, problems = _read(str(file), str(nodes), section.units, section.sha256 or "")
     except CaseError as error:
-        known = error.key in BoxCasingSection.model_fields
-        error.key, error.file = f"casing.{error.key if known else 'file'}", error.file or str(file)
+        is_entry = error.key in BoxCasingSection.model_fields
+        error.key, error.file = f"casing.{error.key if is_entry else 'file'}", error.file or str(file)
         raise
     every = [refused_at(problem, f"casing.{problem.key}") for problem in problems]
     every += [*_seat_problems(case, section, element), *_foot_problems(section, element)]
@@ -92,8 +92,8 @@ def elastic_casing(case: GearboxCase) -> tuple[Superelement, ModalBody]:
     seats = element.of_role("seat")
     used = [seats[name].number for name in casing_seats(case) if name not in section.stands_still]
     used += [node.number for node in element.of_role("foot").values()]
-    heard = [node.number for node in element.nodes if node.role == "sensor" and node.number not in used]
-    numbers = tuple(dict.fromkeys(used)), tuple(dict.fromkeys(heard))
+    sensor_nodes = [node.number for node in element.nodes if node.role == "sensor" and node.number not in used]
+    numbers = tuple(dict.fromkeys(used)), tuple(dict.fromkeys(sensor_nodes))
     file, nodes = map(str, casing_file_paths(case))
     highest = section.max_frequency or HIGHEST_MODE
     return element, _split(file, nodes, section.units, section.sha256 or "", numbers, highest)
@@ -152,9 +152,10 @@ def elastic_casing_model(case: GearboxCase, station: int) -> tuple[CasingModel, 
 
     nodes = {name: node.number for name, node in element.of_role("seat").items()}
     seats = {name: place for name, place in casing_seats(case).items() if name not in standing}
-    own = {name: stations[-1] + 1 + i for i, name in enumerate(seats)}
+    seat_stations = {name: stations[-1] + 1 + i for i, name in enumerate(seats)}
     followers = tuple(
-        Follower(f"seat {name}", own[name], stations, rows(nodes[name], place)) for name, place in seats.items()
+        Follower(f"seat {name}", seat_stations[name], stations, rows(nodes[name], place))
+        for name, place in seats.items()
     )
     feet, offsets, given = [], [], dict(zip(section.foot_names, section.foot, strict=True))
     for name, node in element.of_role("foot").items():
@@ -168,7 +169,7 @@ def elastic_casing_model(case: GearboxCase, station: int) -> tuple[CasingModel, 
         body.centre,
         casing_seats(case),
         standing,
-        own,
+        seat_stations,
         tuple(feet),
         foot_stiffness(case, stiffness),
         np.reshape(offsets, (-1, 3)),
@@ -226,7 +227,7 @@ def _seat_problems(case: GearboxCase, section: BoxCasingSection, element: Supere
     for name in seats.keys() & nodes.keys():
         place = element.place[nodes[name].number]
         if (distance := math.dist(place, seats[name])) > limit:
-            at, wanted = (", ".join(LENGTH.show(float(value)) for value in one) for one in (place, seats[name]))
+            at, wanted = (", ".join(LENGTH.show(float(value)) for value in lengths) for lengths in (place, seats[name]))
             yield CaseError(
                 f"the node of the seat {name} is far from it",
                 code="E-RANGE",

@@ -50,15 +50,15 @@ def casing_variables(every: Sequence[Deflection]) -> dict[str, tuple]:
 
 def seat_motions(case: GearboxCase, casing: CasingModel, motion: np.ndarray) -> np.ndarray:
     """Compute the motions (b, 3) of the casing at all bearings in it [m]; NaN at others, 0 in what stands still."""
-    found = np.full((len(case.bearing), 3), np.nan)
+    motions = np.full((len(case.bearing), 3), np.nan)
     motion = motion.reshape(-1, 6)
     for number, bearing in enumerate(case.bearing):
         name = bearing_name(bearing, number)
         if bearing.outer_shaft is None:
             link = rigid_link(casing.seats[name] - casing.centre)
-            own = motion[casing.own[name]] if name in casing.own else link @ motion[casing.station]
-            found[number] = 0.0 if name in casing.standing else own[:3]
-    return found
+            of_seat = motion[casing.own[name]] if name in casing.own else link @ motion[casing.station]
+            motions[number] = 0.0 if name in casing.standing else of_seat[:3]
+    return motions
 
 
 def casing_coordinates(state: Deflection) -> dict[str, tuple]:
@@ -91,13 +91,13 @@ def largest_foot_force(data: Any) -> Iterator[tuple[str, str]]:
     yield "largest foot force", f"{size[case, foot]:.4g} N, {where}"
 
 
-def seat_curve(one: xr.Dataset, way: int) -> tuple[np.ndarray, np.ndarray, np.ndarray] | None:
+def seat_curve(load_case: xr.Dataset, way: int) -> tuple[np.ndarray, np.ndarray, np.ndarray] | None:
     """Find places (n,) along z [mm], motions (n,) along x or y [um] of casing and shaft at bearings, of a load case.
 
     Bearings between shafts, as of planets, have no seat in the casing.
     """
-    if "seat_displacement" not in one:
+    if "seat_displacement" not in load_case:
         return None
-    casing, shaft = (1e6 * one[name].values[:, way] for name in ("seat_displacement", "bearing_displacement"))
+    casing, shaft = (1e6 * load_case[name].values[:, way] for name in ("seat_displacement", "bearing_displacement"))
     seated = np.isfinite(casing)
-    return 1e3 * one["bearing_place"].values[seated, 2], casing[seated], shaft[seated]
+    return 1e3 * load_case["bearing_place"].values[seated, 2], casing[seated], shaft[seated]

@@ -96,18 +96,18 @@ def _held(case: GearboxCase, problems: Sequence[CaseError]) -> Iterator[CaseErro
     yield from tilting
     if any(key.startswith(_OF_THE_FLOW) or (key.startswith("shaft") and key.endswith("].name")) for key in keys):
         return
-    told: set[str] = set()
+    refused: set[str] = set()
     for number, load_case in enumerate(case.operation.load_case):
         try:
             flow = gearbox_flow(case, load_case)
         except FemgearError as error:
-            yield from (problem for problem in error.problems if problem.message not in told)  # type: ignore[misc]
-            told |= {problem.message for problem in error.problems}
+            yield from (problem for problem in error.problems if problem.message not in refused)  # type: ignore[misc]
+            refused |= {problem.message for problem in error.problems}
             continue
         if not floating and not any(key.startswith(("bearing", "shaft")) for key in keys):
-            thrusts = [problem for problem in untaken_thrust(case, flow, number) if problem.key not in told]
+            thrusts = [problem for problem in untaken_thrust(case, flow, number) if problem.key not in refused]
             # of many load cases the first one
-            told |= {str(problem.key) for problem in thrusts}
+            refused |= {str(problem.key) for problem in thrusts}
             yield from thrusts
         if number == 0 and not any(key.startswith("shaft") for key in keys):
             unclosed = [*unclosed_chains(case, flow)]
@@ -138,23 +138,25 @@ def _names(case: GearboxCase) -> Iterator[CaseError]:
     kinds = {
         "shaft": [(f"shaft[{i}]", shaft.name) for i, shaft in enumerate(case.shaft)],
         "load, bearing and mass": [
-            (f"{kind}[{i}]", one.name)
+            (f"{kind}[{i}]", section.name)
             for kind in ("load", "bearing", "mass")
-            for i, one in enumerate(getattr(case, kind))
-            if one.name is not None
+            for i, section in enumerate(getattr(case, kind))
+            if section.name is not None
         ],
         "stage": [
-            (f"{kind}[{i}]", one.name) for kind in ("pair", "planetary") for i, one in enumerate(getattr(case, kind))
+            (f"{kind}[{i}]", section.name)
+            for kind in ("pair", "planetary")
+            for i, section in enumerate(getattr(case, kind))
         ],
         "load case": [
             (f"operation.load_case[{i}]", load_case.name) for i, load_case in enumerate(case.operation.load_case)
         ],
     }
     for kind, entries in kinds.items():
-        known: dict[str, str] = {CASING: ""} if kind == "shaft" else {}
+        earlier: dict[str, str] = {CASING: ""} if kind == "shaft" else {}
         for key, name in entries:
-            if name in known:
-                whose = f"that of {known[name]} already" if known[name] else "the word for the casing"
+            if name in earlier:
+                whose = f"that of {earlier[name]} already" if earlier[name] else "the word for the casing"
                 yield CaseError(
                     f"the name is {whose}",
                     code="E-DUPLICATE",
@@ -162,7 +164,7 @@ def _names(case: GearboxCase) -> Iterator[CaseError]:
                     value=name,
                     remedy=f"give every {kind} a name of its own",
                 )
-            known.setdefault(name, key)
+            earlier.setdefault(name, key)
 
 
 def _references(case: GearboxCase) -> Iterator[CaseError]:
@@ -170,7 +172,7 @@ def _references(case: GearboxCase) -> Iterator[CaseError]:
     shafts = [shaft.name for shaft in case.shaft]
     used: list[tuple[str, str]] = []
     for kind in ("mass", "bearing", "load"):
-        used += [(f"{kind}[{i}].shaft", one.shaft) for i, one in enumerate(getattr(case, kind))]
+        used += [(f"{kind}[{i}].shaft", section.shaft) for i, section in enumerate(getattr(case, kind))]
     for i, bearing in enumerate(case.bearing):
         used += [(f"bearing[{i}].outer_shaft", bearing.outer_shaft)] if bearing.outer_shaft is not None else []
     used += [(f"coupling[{i}].between", name) for i, coupling in enumerate(case.coupling) for name in coupling.between]
@@ -200,10 +202,10 @@ def port_names(case: GearboxCase) -> list[str]:
     return [load.name for load in case.load] + [shaft.name for shaft in case.shaft if not shaft.part]
 
 
-def _unknown(key: str, name: str, known: list[str], table: str, others: str = "") -> Iterator[CaseError]:
-    if name not in known:
-        limit = ", ".join([*dict.fromkeys(known)][:20]) or f"none: the case has no {table}"
-        yield no_such("part", key, name, known, f"name a {table}{others}", limit=limit)
+def _unknown(key: str, name: str, names: list[str], table: str, others: str = "") -> Iterator[CaseError]:
+    if name not in names:
+        limit = ", ".join([*dict.fromkeys(names)][:20]) or f"none: the case has no {table}"
+        yield no_such("part", key, name, names, f"name a {table}{others}", limit=limit)
 
 
 def _known(case: GearboxCase, *names: str) -> bool:
@@ -238,14 +240,14 @@ def _seats(case: GearboxCase) -> Iterator[CaseError]:
 def _all_seats(case: GearboxCase) -> Iterator[tuple[str, str, float | None]]:
     """Key, shaft and position of every place on a shaft."""
     for kind in ("mass", "bearing", "load"):
-        for i, one in enumerate(getattr(case, kind)):
-            yield f"{kind}[{i}].position", one.shaft, one.position
+        for i, section in enumerate(getattr(case, kind)):
+            yield f"{kind}[{i}].position", section.shaft, section.position
     for i, bearing in enumerate(case.bearing):
         if bearing.outer_shaft is not None:
             yield f"bearing[{i}].outer_position", bearing.outer_shaft, bearing.outer_position
     for kind, shafts in (("coupling", "between"), ("pair", "shafts")):
-        for i, one in enumerate(getattr(case, kind)):
-            for shaft, position in zip(getattr(one, shafts), one.positions or (None, None), strict=True):
+        for i, section in enumerate(getattr(case, kind)):
+            for shaft, position in zip(getattr(section, shafts), section.positions or (None, None), strict=True):
                 yield f"{kind}[{i}].positions", shaft, position
     for i, stage in enumerate(case.planetary):
         for member in ("sun", "carrier", "ring"):

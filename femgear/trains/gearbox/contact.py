@@ -68,11 +68,11 @@ class StageContact:
 
     def shares_at(self, mesh: int, count: int) -> np.ndarray:
         """Shares (count,) of the load of a mesh in so many equal slices."""
-        own = self.shares[mesh]
-        if count == len(own):
-            return own
+        of_mesh = self.shares[mesh]
+        if count == len(of_mesh):
+            return of_mesh
         edges = np.linspace(0.0, 1.0, count + 1)
-        sums = np.interp(edges, np.linspace(0.0, 1.0, len(own) + 1), np.append(0.0, np.cumsum(own)))
+        sums = np.interp(edges, np.linspace(0.0, 1.0, len(of_mesh) + 1), np.append(0.0, np.cumsum(of_mesh)))
         return np.diff(sums)
 
 
@@ -114,8 +114,8 @@ def stage_contact(
     deviations = askew(set_deviations(case), gears, slopes / cosine, back=back)
     apart = unequal_separation(np.zeros(len(slopes)) if separation is None else separation)
     deviations = displaced(deviations, gears, apart / cosine, back=back)
-    found = solve_static(case, steps=steps or Steps(), deviations=deviations)
-    cycle = found.cycle
+    static = solve_static(case, steps=steps or Steps(), deviations=deviations)
+    cycle = static.cycle
     shares = np.ones((len(slopes), 1))
     if cycle.slice_load is not None:
         load = cycle.slice_load.sum(axis=1).mean(axis=-1)
@@ -127,7 +127,7 @@ def stage_contact(
         kind = number // gears.n_planets * gears.n_planets
         stiffness[number] = stiffness[kind : kind + gears.n_planets].max()
         approach[number] = max(approach[number], _separation(deviations, gears, back=back)[number])
-    return StageContact(found, stiffness, force, shares, cosine * approach - apart, case, deviations)
+    return StageContact(static, stiffness, force, shares, cosine * approach - apart, case, deviations)
 
 
 def _separation(deviations: SetDeviations, gears: GearSet, *, back: bool) -> np.ndarray:
@@ -192,7 +192,7 @@ def askew(deviations: SetDeviations, gears: GearSet, slopes: np.ndarray, *, back
     """
     ideal, count = no_deviations(gears), gears.n_planets
     leaning = [replace(ideal, planet_misalignment=np.tile(axis, (count, 1))) for axis in np.eye(2)]
-    unit = np.array([misaligned_approach(one, gears, back=back) for one in leaning])
+    unit = np.array([misaligned_approach(lean, gears, back=back) for lean in leaning])
     axes = _of_planets(unit, slopes, count)
     return replace(deviations, planet_misalignment=deviations.planet_misalignment + axes)
 

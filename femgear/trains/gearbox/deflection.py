@@ -157,8 +157,8 @@ class BearingLaw:
 
     def share(self, stiffness: np.ndarray) -> np.ndarray:
         """Take from the stiffness (6, 6) of a bearing that of this law: of springs, which hold other motions too."""
-        own = self.held > 0.0
-        return stiffness if self.section.kind is not None else np.where(own[:, None] & own, stiffness, 0.0)
+        holds = self.held > 0.0
+        return stiffness if self.section.kind is not None else np.where(holds[:, None] & holds, stiffness, 0.0)
 
     def pressing(self, motion: np.ndarray) -> float:
         """Largest load of its elements, or its thrust, at a motion (6,) [N]."""
@@ -191,11 +191,11 @@ def laws_of(model: GearboxModel, factor: float = 1.0) -> list[tuple[int, Bearing
 def mesh_slopes(assembly: Assembly, motion: np.ndarray) -> np.ndarray:
     """Compute the slopes of the approach of all meshes along their widths [rad] from the motions (6n,)."""
     approach = assembly.columns.T @ motion
-    found = np.zeros(len(assembly.contacts))
+    slopes = np.zeros(len(assembly.contacts))
     for number, (contact, part) in enumerate(zip(assembly.contacts, assembly.slices, strict=True)):
         if len(contact.heights) > 1:
-            found[number] = contact.heights @ approach[part] / (contact.heights @ contact.heights)
-    return found
+            slopes[number] = contact.heights @ approach[part] / (contact.heights @ contact.heights)
+    return slopes
 
 
 def mesh_separation(assembly: Assembly, motion: np.ndarray) -> np.ndarray:
@@ -237,25 +237,25 @@ def solve_deflection(
     model = gearbox_model(case, load_case, estimate=estimate)
     staged = [stage for stage in model.stages if model.flow.touches(stage.section)]
     gap = _first_gaps(model, staged)
-    found = shared_torques(solve_state(model, gap))
+    state = shared_torques(solve_state(model, gap))
     if not (staged and case.deflection.contact):
-        return replace(found, slopes=(found.mesh_slope,))
-    apart = mesh_separation(model.assembly, found.motion)
-    start = MeshPositions(np.asarray(slopes, float) if slopes is not None else found.mesh_slope, apart)
+        return replace(state, slopes=(state.mesh_slope,))
+    apart = mesh_separation(model.assembly, state.motion)
+    start = MeshPositions(np.asarray(slopes, float) if slopes is not None else state.mesh_slope, apart)
     history, passes = [start.slopes], []
     contacts: dict[str, StageContact] = {}
     settled, coarse = False, True
-    equal, model = model.flow, found.model
+    equal, model = model.flow, state.model
     for _ in range(case.deflection.passes):
         # stages without load, as of planets far off their places, lie where equal shares would press them
-        flows = {stage.name: found.model.flow if found.model.flow.touches(stage.section) else equal for stage in staged}
+        flows = {stage.name: state.model.flow if state.model.flow.touches(stage.section) else equal for stage in staged}
         contacts = _contacts(model, staged, start, steps, _COARSE if coarse else None, flows)
         stiffness = {name: contact.stiffness for name, contact in contacts.items()}
-        model = gearbox_model(case, load_case, mesh_stiffness=stiffness, estimate=estimate, flow=found.model.flow)
+        model = gearbox_model(case, load_case, mesh_stiffness=stiffness, estimate=estimate, flow=state.model.flow)
         gap = _gaps(model, staged, contacts, start.slopes)
-        found = shared_torques(solve_state(model, gap, start=found))
-        model = found.model
-        end = MeshPositions(found.mesh_slope, mesh_separation(model.assembly, found.motion))
+        state = shared_torques(solve_state(model, gap, start=state))
+        model = state.model
+        end = MeshPositions(state.mesh_slope, mesh_separation(model.assembly, state.motion))
         passes.append(ContactPass(start, end))
         history.append(end.slopes)
         before, start = start, next_start(model, passes)
@@ -267,13 +267,13 @@ def solve_deflection(
             alike = alike or slopes_agree(model, start.slopes, end.slopes, tolerance, least)
         carried = {stage.name for stage in staged if model.flow.touches(stage.section)}
         contacts = {name: contact for name, contact in contacts.items() if name in carried}
-        alike = alike and forces_agree(model, found.mesh_force, contacts, tolerance)
+        alike = alike and forces_agree(model, state.mesh_force, contacts, tolerance)
         if alike and not coarse:
             settled = True
             break
         if alike:
             coarse, passes = False, []
-    return replace(found, contacts=contacts, slopes=tuple(history), settled=settled)
+    return replace(state, contacts=contacts, slopes=tuple(history), settled=settled)
 
 
 def shared_torques(state: Deflection) -> Deflection:
@@ -315,10 +315,10 @@ def _are_equal(stage: StageModel, other: StageModel, start: MeshPositions, flows
     """Whether two stages have the same teeth, and torque and positions that differ by rounding alone."""
     if type(stage.section) is not type(other.section) or _untitled(stage) != _untitled(other):
         return False
-    torque, other_torque = (flows[one.name].first_torque(one.section) for one in (stage, other))
-    own, others = list(stage.meshes), list(other.meshes)
-    slopes = start.slopes[own] - start.slopes[others]
-    apart = unequal_separation(start.separations[own]) - unequal_separation(start.separations[others])
+    torque, other_torque = (flows[compared.name].first_torque(compared.section) for compared in (stage, other))
+    meshes, others = list(stage.meshes), list(other.meshes)
+    slopes = start.slopes[meshes] - start.slopes[others]
+    apart = unequal_separation(start.separations[meshes]) - unequal_separation(start.separations[others])
     lengths = [*np.abs(slopes) * (stage.width or 1.0), *np.abs(apart)]
     return abs(torque - other_torque) <= _COPIED * abs(torque) and max(lengths) <= _COPIED_LENGTH
 
@@ -332,14 +332,14 @@ def _contact(
     model: GearboxModel, stage: StageModel, start: MeshPositions, steps, positions: int | None, flow: BoxFlow
 ) -> StageContact:
     """Contact of the teeth of a stage with the positions of its meshes, at few angles until they settle."""
-    torque, own = -flow.first_torque(stage.section), list(stage.meshes)
+    torque, meshes = -flow.first_torque(stage.section), list(stage.meshes)
     slices = model.case.deflection.slices if model.case.motions == "space" else 0
     try:
         return stage_contact(
             stage.section,
             torque,
-            start.slopes[own],
-            separation=start.separations[own],
+            start.slopes[meshes],
+            separation=start.separations[meshes],
             slices=slices,
             positions=positions,
             steps=steps,
@@ -366,10 +366,10 @@ def _gaps(model, staged, contacts, slopes) -> np.ndarray:
     for stage in staged:
         contact = contacts[stage.name]
         for place, mesh in enumerate(stage.meshes):
-            one, part = assembly.contacts[mesh], assembly.slices[mesh]
-            force = contact.shares_at(place, len(one.heights)) * contact.normal_force[place]
+            mesh_contact, part = assembly.contacts[mesh], assembly.slices[mesh]
+            force = contact.shares_at(place, len(mesh_contact.heights)) * contact.normal_force[place]
             # slope and approach are those with which the contact was solved
-            gap[part] += slopes[mesh] * one.heights + contact.approach[place] - force / one.stiffness
+            gap[part] += slopes[mesh] * mesh_contact.heights + contact.approach[place] - force / mesh_contact.stiffness
     return gap
 
 
@@ -472,11 +472,11 @@ def _guess(T, K, W, k, gap, laws, load, assembly) -> np.ndarray:
 
 def spread_rows(springs: StationSprings, assembly: Assembly) -> np.ndarray:
     """Rows (r, 6n) of springs among all motions."""
-    found = np.zeros((len(springs.rows), assembly.count))
+    spread = np.zeros((len(springs.rows), assembly.count))
     for at, station in enumerate(springs.stations):
         if station != GROUND:
-            found[:, 6 * station : 6 * station + 6] += springs.rows[:, 6 * at : 6 * at + 6]
-    return found
+            spread[:, 6 * station : 6 * station + 6] += springs.rows[:, 6 * at : 6 * at + 6]
+    return spread
 
 
 def check_held(case: GearboxCase) -> None:
@@ -564,11 +564,11 @@ def _linear_bearings(model: GearboxModel, q, press, laws, force, stiffness) -> n
         left = left - rows.T @ law.force(rows @ q)[0]
     rows = np.array([spread_rows(model.bearings[number], assembly)[way] for number, way in rigid]).reshape(-1, len(q))
     others = _conditions(assembly, model)
-    found = np.linalg.lstsq(np.vstack([rows, foot_rows, others]).T, left, rcond=None)[0]
-    for (number, way), value in zip(rigid, found[: len(rigid)], strict=True):
+    forces = np.linalg.lstsq(np.vstack([rows, foot_rows, others]).T, left, rcond=None)[0]
+    for (number, way), value in zip(rigid, forces[: len(rigid)], strict=True):
         force[number, way] = -value
     if model.casing is not None:
-        feet[np.isinf(model.casing.foot_stiffness[:, :3])] = -found[len(rigid) : len(rigid) + len(foot_rows)]
+        feet[np.isinf(model.casing.foot_stiffness[:, :3])] = -forces[len(rigid) : len(rigid) + len(foot_rows)]
     return feet
 
 
@@ -580,9 +580,9 @@ def _conditions(assembly: Assembly, model: GearboxModel) -> np.ndarray:
             rows.append(spread_rows(springs, assembly)[np.isinf(springs.stiffness)])
     for follower in assembly.followers:
         at = [6 * leader + way for leader in follower.leaders for way in range(6)]
-        own = np.arange(6 * follower.station, 6 * follower.station + 6)
+        coordinates = np.arange(6 * follower.station, 6 * follower.station + 6)
         rows.append(np.zeros((6, assembly.count)))
-        rows[-1][np.arange(6), own], rows[-1][:, at] = 1.0, -follower.rows
+        rows[-1][np.arange(6), coordinates], rows[-1][:, at] = 1.0, -follower.rows
     held = np.flatnonzero(assembly.held)
     both = np.unique(np.concatenate([held, model.turns]))
     rows.append(np.eye(assembly.count)[both])

@@ -547,7 +547,7 @@ def _operation(file: DrivetrainFile, speed: Mapping[str, float]) -> dict[str, An
     """Load case of the mean torques; one of them, or the heaviest other body, balances the rest."""
     given, first = [(torque.body, torque) for torque in file.operation.torque], file.body[0].name
     ratio = {name: value / file.operation.speed or 1.0 for name, value in speed.items()}
-    shares = [name for name, one in given if one.share is not None]
+    shares = [name for name, given_torque in given if given_torque.share is not None]
     others = [body for body in file.body if body.name not in [name for name, _ in given]]
     heaviest = max(others, key=lambda body: body.inertia * ratio[body.name] ** 2, default=None)
     output = shares[0] if shares else given[-1][0] if len(given) > 1 or heaviest is None else heaviest.name

@@ -52,10 +52,10 @@ def gearbox_dynamic_model(case: GearboxCase, results: Mapping[str, Any]) -> Dyna
     CaseError: bearings with play, several free motions (E-MODEL), errors of teeth that span several mesh periods
     (E-PERIODS).
     """
-    found: Deflection = results["deflection"].of(case).state
-    model, excitations = found.model, all_excitations(found)
-    known = {"separates": False, "back_flanks": False, "gyroscopic": False, "turning": False}
-    box = nonlinear_gearbox(found, excitations, harmonics=1, **known)
+    state: Deflection = results["deflection"].of(case).state
+    model, excitations = state.model, all_excitations(state)
+    options = {"separates": False, "back_flanks": False, "gyroscopic": False, "turning": False}
+    box = nonlinear_gearbox(state, excitations, harmonics=1, **options)
     if box.bearings:
         names = ", ".join(box.bearings)
         raise _no_model("bearing", f"the stiffness of {names} changes with the play", "leave the play out")
@@ -69,7 +69,7 @@ def gearbox_dynamic_model(case: GearboxCase, results: Mapping[str, Any]) -> Dyna
         raise _no_model("shaft", "it has no single motion without strain", "tie all shafts by their stages")
     shaft = reference_shaft(model)
     speed, phases = model.flow.speed[shaft], pair_phases(case, model.flow)
-    outputs = list(_outputs(found, box))
+    outputs = list(_outputs(state, box))
     meshes = [mesh for stage in box.stages for mesh in stage.meshes]
     inputs = [
         Port(f"torque on {name}", "N m", box.motion[6 * model.ports[name].station + 5], torque)

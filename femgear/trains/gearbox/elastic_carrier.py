@@ -108,10 +108,10 @@ def elastic_carrier(
     rows, link = np.zeros((components * count, 6 * count + 6)), np.zeros((components * count + 6, 6 * count + 6))
     link[:6, :6] = rigid_link(offsets[0] - turn @ way)
     for number, offset in enumerate(offsets):
-        part, own = components * number + np.arange(components), 6 * number + 6 + np.arange(6)
+        part, of_pin = components * number + np.arange(components), 6 * number + 6 + np.arange(6)
         rows[part, :6] = -rigid_link(offset)[:components]
-        rows[np.ix_(part, own)] = np.eye(6)[:components]
-        link[np.ix_(part + 6, own)] = np.eye(6)[:components]
+        rows[np.ix_(part, of_pin)] = np.eye(6)[:components]
+        link[np.ix_(part + 6, of_pin)] = np.eye(6)[:components]
     lever = float(np.hypot(way[0], way[1]))
     springs = [compliance_springs(name, stations, rows, of_pins @ body.compliance @ of_pins.T, lever)]
     if components == 3:
@@ -150,10 +150,10 @@ def pin_flexibility(stage: BoxPlanetarySection, angles: Sequence[float]) -> np.n
     way = body.pins[0] - body.seat
     turn = pin_axes(angles[0] - math.atan2(way[1], way[0])).T
     turned = np.kron(np.eye(count), np.kron(np.eye(components // 3), turn))
-    found = np.zeros((count, 6, count, 6))
+    flexibility = np.zeros((count, 6, count, 6))
     whole = (turned @ body.compliance @ turned.T).reshape(count, components, count, components)
-    found[:, :components, :, :components] = whole
-    return found.reshape(6 * count, 6 * count)
+    flexibility[:, :components, :, :components] = whole
+    return flexibility.reshape(6 * count, 6 * count)
 
 
 def with_carriers(system: MechanicalSystem, assembly: Assembly, carriers: Sequence[ElasticCarrier]) -> MechanicalSystem:

@@ -187,22 +187,22 @@ def _on_meshes(excitation: MeshExcitation) -> MeshExcitation:
 
 def _set_modes(case: Any, steps: Steps) -> Any:
     """Modes of the set that teeth alone make, solved once for modes, response and run-up of the gearbox."""
-    known = {"teeth": case.source}
-    if (kept := steps.kept("set of an elastic ring", known)) is not None:
+    options = {"teeth": case.source}
+    if (kept := steps.kept("set of an elastic ring", options)) is not None:
         return kept
     train = train_of(case)
     static, modes = train.stage("static"), train.stage("modes")
     assert static is not None and modes is not None
     solved = modes.solve(case, static.solve(case, steps=steps), steps=steps)
-    return steps.keep("set of an elastic ring", known, solved)
+    return steps.keep("set of an elastic ring", options, solved)
 
 
 def _participation(diameter: np.ndarray, moved: np.ndarray, sectors: int) -> np.ndarray:
     """Participation (m, 3) of coordinates from what `RingModel` has of a sector (m,)."""
-    found = np.zeros((len(diameter), 3))
-    found[:, 2] = np.where(diameter == 0, sectors * np.real(moved), 0.0)
-    found[:, :2] = np.where(diameter == 1, 0.5 * sectors * np.array([np.real(moved), np.imag(moved)]), 0.0).T
-    return found
+    participation = np.zeros((len(diameter), 3))
+    participation[:, 2] = np.where(diameter == 0, sectors * np.real(moved), 0.0)
+    participation[:, :2] = np.where(diameter == 1, 0.5 * sectors * np.array([np.real(moved), np.imag(moved)]), 0.0).T
+    return participation
 
 
 def with_rings(

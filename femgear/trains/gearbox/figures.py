@@ -50,27 +50,27 @@ def deflected_shafts(deflection: xr.Dataset) -> Figure | None:
 
     Of deflection.nc at its chosen load case; nothing where no shaft has a length or none moves aside.
     """
-    one = deflection.isel(load_case=int(deflection.attrs["load_case"]))
-    place, moved = one["place"].values, one["displacement"].values[:, :3]
-    member, shafts = one["member"].values, one["shaft"].values
+    load_case = deflection.isel(load_case=int(deflection.attrs["load_case"]))
+    place, moved = load_case["place"].values, load_case["displacement"].values[:, :3]
+    member, shafts = load_case["member"].values, load_case["shaft"].values
     if all(np.ptp(place[member == shaft, 2]) == 0.0 for shaft in shafts) or np.abs(moved[:, :2]).max() < _STILL:
         return None
     figure, axes = new_figure(columns=2, width=12.0, height=5.4)
     for ax, (way, axis) in zip(axes, _PLANES, strict=True):
         for number, shaft in enumerate(shafts):
-            own = np.flatnonzero(member == shaft)
-            own = own[np.argsort(place[own, 2])]
-            style = {"color": COLOURS[number % len(COLOURS)], "marker": "o" if len(own) == 1 else "."}
+            stations = np.flatnonzero(member == shaft)
+            stations = stations[np.argsort(place[stations, 2])]
+            style = {"color": COLOURS[number % len(COLOURS)], "marker": "o" if len(stations) == 1 else "."}
             style["linestyle"] = _DASHES[number // len(COLOURS) % len(_DASHES)]
-            ax.plot(1e3 * place[own, 2], 1e6 * moved[own, way], linewidth=2.2, label=str(shaft), **style)
+            ax.plot(1e3 * place[stations, 2], 1e6 * moved[stations, way], linewidth=2.2, label=str(shaft), **style)
         ax.axhline(0.0, color=GREY, linewidth=0.8)
-        if seats := seat_curve(one, way):
+        if seats := seat_curve(load_case, way):
             z, casing, inner = seats
             style = {"color": BLACK, "linestyle": "none", "marker": "s", "markerfacecolor": "none"}
             ax.plot(z, casing, label="casing at its bearings", **style)
             ax.vlines(z, casing, inner, color=GREY, linewidth=1.0, linestyle=":")
         ax.margins(0.08, 0.34)
-        _arrows(ax, one, way)
+        _arrows(ax, load_case, way)
         label(ax, "z [mm]", f"deflection along {axis} [µm]")
     legend_below(figure, axes[0], columns=6)
     _part_names(figure)
@@ -120,12 +120,14 @@ def _spots(behind: float, va: str) -> Iterator[tuple[tuple[float, float], str, s
         yield (0.0, behind + way * step * _STEP), "center", va
 
 
-def _arrows(ax, one: xr.Dataset, way: int) -> None:
+def _arrows(ax, load_case: xr.Dataset, way: int) -> None:
     """Draw the forces of the bearings on their shafts, the longest one `_ARROW` points long, and name the largest."""
-    force, place, moved = (one[name].values for name in ("bearing_force", "bearing_place", "bearing_displacement"))
+    force, place, moved = (
+        load_case[name].values for name in ("bearing_force", "bearing_place", "bearing_displacement")
+    )
     largest = float(np.abs(force[:, :2]).max(initial=0.0))
     named = np.sort(np.abs(force[:, way]))[::-1][:_MOST_NAMED].min(initial=np.inf)
-    for name, vector, at, motion in zip(one["bearing"].values, force, place, moved, strict=True):
+    for name, vector, at, motion in zip(load_case["bearing"].values, force, place, moved, strict=True):
         if not largest or abs(vector[way]) < _LEAST * largest:
             continue
         length = _ARROW * vector[way] / largest
@@ -275,10 +277,10 @@ def _draw_deflection(drawn: Drawn) -> dict[str, Figure]:
 
 def _draw_modes(drawn: Drawn) -> dict[str, Figure]:
     data = drawn.data["modes"]
-    found = {"campbell": gearbox_campbell(data)}
-    found |= {"mode_energy": mode_energy(data)} if np.any(data["frequency"].values > 0.0) else {}
+    drawings = {"campbell": gearbox_campbell(data)}
+    drawings |= {"mode_energy": mode_energy(data)} if np.any(data["frequency"].values > 0.0) else {}
     by_stage = draw_stage_energy(data)
-    return found if by_stage is None else found | {"stage_energy": by_stage}
+    return drawings if by_stage is None else drawings | {"stage_energy": by_stage}
 
 
 FIGURES = {

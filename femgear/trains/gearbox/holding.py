@@ -94,14 +94,14 @@ def floating_shafts(case: GearboxCase, *, judged: Mapping[str, Sequence[int]]) -
 
 def _floating(case: GearboxCase, numbers: Sequence[int]) -> CaseError:
     names = [case.shaft[i].name for i in numbers]
-    own = [bearing.name or f"bearing[{i}]" for i, bearing in enumerate(case.bearing) if bearing.shaft in names]
+    bearings = [bearing.name or f"bearing[{i}]" for i, bearing in enumerate(case.bearing) if bearing.shaft in names]
     plural = len(names) > 1
     return CaseError(
         f"shaft{'s' * plural} {', '.join(names)} float{'s' * (not plural)} along the axis: nothing holds "
         f"{'them' if plural else 'it'} towards +z or -z",
         code="E-MECHANISM",
         key=f"shaft[{numbers[0]}].name",
-        value=f"{', '.join(own)} without axial stiffness" if own else "no bearing",
+        value=f"{', '.join(bearings)} without axial stiffness" if bearings else "no bearing",
         limit="one bearing or coupling that holds it along its axis",
         remedy=f"give a bearing of {names[0]} {_ALONG}",
     )
@@ -129,8 +129,11 @@ def loose_fits(case: GearboxCase, pairs: Sequence[PairSection]) -> Iterator[Case
             continue
         sizes = {pair.name: pair_sizes(pair) for pair in on_shaft}
         modules = {
-            name: 2.0 * one.base_radii[0] * math.cos(one.base_helix) / (one.teeth[0] * math.cos(one.pressure_angles[0]))
-            for name, one in sizes.items()
+            name: 2.0
+            * size.base_radii[0]
+            * math.cos(size.base_helix)
+            / (size.teeth[0] * math.cos(size.pressure_angles[0]))
+            for name, size in sizes.items()
         }
         name = min(modules, key=lambda key: modules[key])
         most = LARGEST_CLEARANCE * modules[name]
@@ -240,17 +243,17 @@ def _holders(case: GearboxCase) -> tuple[list[tuple[str, str]], list[tuple[float
 
 def _untaken(case: GearboxCase, number: int, thrust: float, load_case: str) -> CaseError:
     name, way = case.shaft[number].name, "+z" if thrust > 0.0 else "-z"
-    key, told = f"shaft[{number}].name", "no bearing that takes thrust"
+    key, reason = f"shaft[{number}].name", "no bearing that takes thrust"
     for i, bearing in enumerate(case.bearing):
         if bearing.shaft == name and any(senses(bearing)):
             key = f"bearing[{i}].{'contact_angle' if bearing.axial_sense is None else 'axial_sense'}"
-            told = f"{bearing.name or key} takes thrust towards {'+z' if senses(bearing)[0] else '-z'} alone"
+            reason = f"{bearing.name or key} takes thrust towards {'+z' if senses(bearing)[0] else '-z'} alone"
             break
     return CaseError(
         f"nothing takes the thrust on shaft {name} towards {way} in {named_load_case(load_case)}",
         code="E-MECHANISM",
         key=key,
-        value=f"{FORCE.show(abs(thrust))} towards {way}; {told}",
+        value=f"{FORCE.show(abs(thrust))} towards {way}; {reason}",
         limit=f"a bearing of {name} that takes thrust towards {way}",
         remedy="turn the bearing round, give a second one of the other sense, or change the hand of the teeth",
     )

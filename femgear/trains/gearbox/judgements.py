@@ -185,12 +185,12 @@ def _marked(level: float, marks: Marks, stage: str) -> str:
     return marks(_level(level), "W-EXCITATION", *OF_BOX_RESPONSE, of=(stage,))
 
 
-def _loudest_of_run_up(runup: Any, marks: Marks, known: str) -> str:
+def _loudest_of_run_up(runup: Any, marks: Marks, level_sensor: str) -> str:
     """Write level and speed where the run-up is loudest, with the sensor where it is not the one that is ``known``."""
     level = runup["level"].values
     at, sensor = np.unravel_index(int(level.argmax()), level.shape)
     name = str(runup["sensor"].values[sensor])
-    where = "" if name == known else f"sensor {name}, "
+    where = "" if name == level_sensor else f"sensor {name}, "
     return f"{_marked(float(level[at, sensor]), marks, 'runup')} at {where}{runup['speed'].values[at]:,.0f} rpm"
 
 

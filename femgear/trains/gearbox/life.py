@@ -54,17 +54,17 @@ class SpectrumLives:
     load: np.ndarray
 
 
-def bearing_lives(found: Deflection) -> np.ndarray:
+def bearing_lives(deflection: Deflection) -> np.ndarray:
     """Compute the lives (b, 3) of all bearings in hours at one load case: L10, L10r, and a_ISO L10r.
 
     NaN without geometry and dynamic rating, of the last also without fatigue limit, viscosity ratio and
     contamination; infinite without load or at rest.
     """
-    lives = np.full((len(found.states), 3), np.nan)
-    for number, (section, state) in enumerate(zip(found.model.case.bearing, found.states, strict=True)):
+    lives = np.full((len(deflection.states), 3), np.nan)
+    for number, (section, state) in enumerate(zip(deflection.model.case.bearing, deflection.states, strict=True)):
         if state is None or (rating := section.dynamic_rating) is None:
             continue
-        force, turns = found.bearing_force[number], turning_speed(found, number)
+        force, turns = deflection.bearing_force[number], turning_speed(deflection, number)
         hours = 1e6 / 3600.0 / turns if turns else math.inf
         basic = basic_rating_life(state.bearing, math.hypot(force[0], force[1]), abs(float(force[2])), rating)
         reference = reference_rating_life(state, rating)

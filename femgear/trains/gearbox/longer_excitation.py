@@ -47,16 +47,16 @@ def longer_excitation(response: GearboxResponse, *, steps: Steps | None = None) 
         At the speed with the largest force of every stage, and at the loudest one of the `SENSORS_JUDGED` loudest
         sensors; None where nothing excites, or where the longer one alone is not solved.
     """
-    found, case = response.deflection, response.deflection.model.case
+    state, case = response.deflection, response.deflection.model.case
     if not response.stages:
         return None
-    end = min(_HIGHEST, max(2.0 * response.up_to, _BEYOND_TEETH * teeth_frequency(found)))
+    end = min(_HIGHEST, max(2.0 * response.up_to, _BEYOND_TEETH * teeth_frequency(state)))
     most = case.dynamics.mesh_harmonics and 2 * case.dynamics.mesh_harmonics
     dynamics = case.dynamics.model_copy(
         update={"up_to": end, "mesh_harmonics": most, "tolerance": max(_TOLERANCE, case.dynamics.tolerance)}
     )
-    model = replace(found.model, case=case.model_copy(update={"dynamics": dynamics}))
-    longer = replace(found, model=model)
+    model = replace(state.model, case=case.model_copy(update={"dynamics": dynamics}))
+    longer = replace(state, model=model)
     try:
         return solve_gearbox_response(longer, response.speed[_speeds_judged(response)], steps=steps)
     except ConvergenceError:
@@ -67,9 +67,9 @@ def _speeds_judged(response: GearboxResponse) -> np.ndarray:
     """Places of the speeds with the largest force of every stage, and the loudest ones, ascending."""
     places = {int((stage.force[..., 1] / stage.force[..., 0]).max(axis=1).argmax()) for stage in response.stages}
     if count := len(gearbox_sensors(response.deflection.model.case)):
-        heard = level(response, accelerations(response, count))
-        loudest = np.argsort(-heard.max(axis=0), kind="stable")[:SENSORS_JUDGED]
-        places |= {int(at) for at in heard[:, loudest].argmax(axis=0)}
+        levels = level(response, accelerations(response, count))
+        loudest = np.argsort(-levels.max(axis=0), kind="stable")[:SENSORS_JUDGED]
+        places |= {int(at) for at in levels[:, loudest].argmax(axis=0)}
     return np.array(sorted(places))
 
 

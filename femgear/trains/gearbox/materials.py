@@ -19,12 +19,12 @@ def with_materials(data: Any) -> Any:
     """
     if not isinstance(data, dict):
         return data
-    found = dict(data)
+    tables = dict(data)
     for kind in _GEARS:
         stages = data.get(kind)
         if isinstance(stages, list | tuple) and any(_lacking(stage) for stage in stages):
-            found[kind] = [_filled(data, kind, stage) if _lacking(stage) else stage for stage in stages]
-    return found
+            tables[kind] = [_filled(data, kind, stage) if _lacking(stage) else stage for stage in stages]
+    return tables
 
 
 def _lacking(stage: Any) -> bool:
@@ -72,8 +72,12 @@ def material_notices(data: dict, case: Any) -> Iterator[Finding]:
             made = USUAL_MATERIAL | _table(data.get("material"))
             whose = "that of the gearbox" if "material" in data else "steel"
             text = f"the teeth have no material: {whose} is taken, {made['youngs_modulus']}"
-            own = {shaft: _of_shaft(data, shaft) for shaft in _shafts(kind, stage)}
-            own = {shaft: one["youngs_modulus"] for shaft, one in own.items() if "youngs_modulus" in one}
-            if own:
-                text += f", of gears on {', '.join(f'{shaft} {modulus}' for shaft, modulus in own.items())}"
+            of_shafts = {shaft: _of_shaft(data, shaft) for shaft in _shafts(kind, stage)}
+            of_shafts = {
+                shaft: material["youngs_modulus"]
+                for shaft, material in of_shafts.items()
+                if "youngs_modulus" in material
+            }
+            if of_shafts:
+                text += f", of gears on {', '.join(f'{shaft} {modulus}' for shaft, modulus in of_shafts.items())}"
             yield Finding("W-ESTIMATED", f"{kind}[{number}].teeth.material", text, remedy="give it with the teeth")

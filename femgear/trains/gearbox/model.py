@@ -369,8 +369,8 @@ class _Builder:
             for shaft, place in zip(coupling.between, positions, strict=True)
         ]
         ends = [self._place(shaft, place) for shaft, place in zip(coupling.between, positions, strict=True)]
-        known = [end for end in ends if end is not None]
-        way = known[-1] - known[0]
+        seated = [end for end in ends if end is not None]
+        way = seated[-1] - seated[0]
         offsets = [
             np.asarray(seat.offset) + share * way
             for seat, share in zip(seats, (coupling.joint, coupling.joint - 1.0), strict=True)
@@ -449,8 +449,8 @@ class _Builder:
         }
         places = {name: self._place(shaft, getattr(stage, f"{name}_position")) for name, shaft in members.items()}
         # a member that stands in the casing lies where the others are
-        known = [place for place in places.values() if place is not None]
-        sun, ring = (known[at] if places[name] is None else places[name] for name, at in (("sun", 0), ("ring", -1)))
+        given = [place for place in places.values() if place is not None]
+        sun, ring = (given[at] if places[name] is None else places[name] for name, at in (("sun", 0), ("ring", -1)))
         flank = -1 if flow.first_torque(stage) > 0.0 else 1
         centres, width, middle = _common([sun, ring], (sizes.face_widths[0], sizes.face_widths[-1]))
         width = min([w for w in sizes.face_widths if w] or [0.0])
@@ -491,7 +491,10 @@ class _Builder:
         offsets = [np.asarray(carrier.offset) + np.asarray(self.places[planet]) - place for planet in planets]
         holders = (carrier.station,) * len(planets)
         if stage.superelement is not None:
-            pins = [self._station(f"{stage.name} pin {n + 1}", self.places[one]) for n, one in enumerate(planets)]
+            pins = [
+                self._station(f"{stage.name} pin {n + 1}", self.places[planet_name])
+                for n, planet_name in enumerate(planets)
+            ]
             speed = 0.0 if stage.carrier == CASING else self.flow.speed[stage.carrier]
             elastic = elastic_carrier(stage, (carrier.station, *pins), offsets, angles, speed)
             self.springs += elastic.springs
@@ -510,14 +513,14 @@ class _Builder:
     def _contact(self, name: str, seats: tuple[Seat, Seat], pitch, normal, width: float, stiffness: float) -> int:
         slices = self.case.deflection.slices if width and self.case.motions == "space" else 1
         heights = (np.arange(slices) + 0.5) * width / slices - 0.5 * width if slices > 1 else np.zeros(1)
-        own = []
+        rows = []
         for seat, point in zip(seats, np.broadcast_to(pitch, (2, 3)), strict=True):
             points = np.tile(point, (slices, 1))
             points[:, 2] += heights
-            own.append(points - np.asarray(self.places[seat.station] if seat.station != GROUND else (0.0, 0.0, 0.0)))
+            rows.append(points - np.asarray(self.places[seat.station] if seat.station != GROUND else (0.0, 0.0, 0.0)))
         stations = (seats[0].station, seats[1].station)
         spread = np.full(slices, stiffness / slices)
-        self.contacts.append(Contact(name, stations, np.tile(normal, (2, 1)), np.stack(own), heights, spread))
+        self.contacts.append(Contact(name, stations, np.tile(normal, (2, 1)), np.stack(rows), heights, spread))
         return len(self.contacts) - 1
 
     def _mesh_stiffness(self, stage: PairSection | BoxPlanetarySection, kind: int, mesh: int) -> float:
@@ -545,10 +548,12 @@ class _Builder:
             diametral = getattr(teeth.helical, key).diametral_inertia
         if key in gears:
             body = gear_cylinder(gears[key], gear_material(teeth, key).density)
-            found = [value if math.isfinite(value) else guess for value, guess in zip((mass, inertia, diametral), body)]
+            properties = [
+                value if math.isfinite(value) else guess for value, guess in zip((mass, inertia, diametral), body)
+            ]
             if math.isfinite(inertia) and not math.isfinite(diametral):
-                found[2] = 0.5 * inertia + found[0] * gears[key].face_width ** 2 / 12.0
-            return found[0], found[1], found[2]
+                properties[2] = 0.5 * inertia + properties[0] * gears[key].face_width ** 2 / 12.0
+            return properties[0], properties[1], properties[2]
         return mass, inertia, diametral if math.isfinite(diametral) else 0.5 * inertia
 
     def _planet_body(self, stage: BoxPlanetarySection, teeth) -> tuple[float, float, float]:
@@ -556,7 +561,7 @@ class _Builder:
         mass, polar, transverse = given.mass, given.inertia, given.transverse_inertia
         if teeth is not None:
             body = self._gear_body(teeth, "planet")
-            mass, polar = (value if value is not None else own for value, own in zip((mass, polar), body))
+            mass, polar = (value if value is not None else guess for value, guess in zip((mass, polar), body))
             transverse = body[2] if transverse is None else transverse
         if mass is None or polar is None:
             raise CaseError(
@@ -575,10 +580,10 @@ class _Builder:
 
         for name, torque in self.flow.port_torque.items():
             add(ports[name], [0.0, 0.0, 0.0, 0.0, 0.0, torque])
-        for one in self.case.load:
-            force = np.add(one.force, load_case.force.get(one.name, 0.0))
-            moment = np.add(one.tilting_moment, load_case.tilting_moment.get(one.name, 0.0))
-            add(ports[one.name], [*force, *moment, 0.0])
+        for section in self.case.load:
+            force = np.add(section.force, load_case.force.get(section.name, 0.0))
+            moment = np.add(section.tilting_moment, load_case.tilting_moment.get(section.name, 0.0))
+            add(ports[section.name], [*force, *moment, 0.0])
         if self.case.gravity is not None:
             along = np.asarray(self.case.gravity.direction)
             field = np.zeros((len(assembly.names), 6))
@@ -632,23 +637,23 @@ def _from_first(angles: Sequence[float]) -> list[float]:
 
 def seats_on(case: GearboxCase, shaft: str) -> set[float]:
     """Collect the positions on a shaft at which something sits [m]."""
-    found: set[float] = set()
-    for one in (*case.mass, *case.bearing, *case.load):
-        if one.shaft == shaft and one.position is not None:
-            found.add(one.position)
+    places: set[float] = set()
+    for part in (*case.mass, *case.bearing, *case.load):
+        if part.shaft == shaft and part.position is not None:
+            places.add(part.position)
     for bearing in case.bearing:
         if bearing.outer_shaft == shaft and bearing.outer_position is not None:
-            found.add(bearing.outer_position)
+            places.add(bearing.outer_position)
     for names, positions in [(coupling.between, coupling.positions) for coupling in case.coupling] + [
         (pair.shafts, pair.positions) for pair in case.pair
     ]:
-        found |= {p for name, p in zip(names, positions or (), strict=False) if name == shaft and p is not None}
+        places |= {p for name, p in zip(names, positions or (), strict=False) if name == shaft and p is not None}
     for stage in case.planetary:
         for member in ("sun", "carrier", "ring"):
             place = stage.member_position(member)
             if getattr(stage, member) == shaft and place is not None:
-                found.add(place)
-    return found
+                places.add(place)
+    return places
 
 
 def scaled_stiffness(section: BoxBearingSection, factor: float) -> tuple[float, ...]:
@@ -684,17 +689,17 @@ def member_of_stations(model: GearboxModel) -> list[str]:
 
 def bearing_places(model: GearboxModel) -> np.ndarray:
     """Find the places (b, 3) of all bearings [m]."""
-    found = np.zeros((len(model.case.bearing), 3))
+    places = np.zeros((len(model.case.bearing), 3))
     for number, bearing in enumerate(model.case.bearing):
         shaft = model.case.shaft_named(bearing.shaft)
-        found[number] = *shaft.axis, shaft.start + (bearing.position or 0.0)
-    return found
+        places[number] = *shaft.axis, shaft.start + (bearing.position or 0.0)
+    return places
 
 
 def bearing_motions(model: GearboxModel, motion: np.ndarray) -> np.ndarray:
     """Compute the displacements (b, 3) of the shafts at all bearings [m] from the motions (6n,)."""
-    found = np.zeros((len(model.case.bearing), 3))
+    motions = np.zeros((len(model.case.bearing), 3))
     for number, bearing in enumerate(model.case.bearing):
         seat = model.seat(bearing.shaft, bearing.position)
-        found[number] = (rigid_link(seat.offset) @ motion[6 * seat.station : 6 * seat.station + 6])[:3]
-    return found
+        motions[number] = (rigid_link(seat.offset) @ motion[6 * seat.station : 6 * seat.station + 6])[:3]
+    return motions

@@ -251,17 +251,17 @@ def count_modes(system: MechanicalSystem, stiffness: np.ndarray, top: float | No
 def excitation_orders(model: GearboxModel, reference: str) -> dict[str, float]:
     """List turns of shafts and mesh lines of stages over the turn of a shaft, equal ones once."""
     speed = abs(model.flow.speed[reference])
-    found: dict[str, float] = {}
+    orders: dict[str, float] = {}
     if not speed:
-        return found
+        return orders
     lines = [(f"{name} turn", abs(value) / speed) for name, value in model.flow.speed.items()]
     for name, hertz in model.flow.mesh_frequency.items():
         order = 2.0 * np.pi * hertz / speed
         lines += [(f"{name} mesh" if h == 1 else f"{h} x {name} mesh", h * order) for h in (1, 2, 3)]
     for name, order in lines:
-        if order > 0.0 and all(abs(order - other) > 1e-9 * order for other in found.values()):
-            found[name] = order
-    return found
+        if order > 0.0 and all(abs(order - other) > 1e-9 * order for other in orders.values()):
+            orders[name] = order
+    return orders
 
 
 def _kinetic(

@@ -351,13 +351,13 @@ def _stage(
     if count > 1 and table.size:
         # as planets that only the gearbox loads unequally are taken: each as the mean of all
         table = table.reshape(3, -1, count).mean(axis=2).repeat(count, axis=1)
-    own = [number for number, mesh in enumerate(meshes) if mesh in stage.meshes]
-    of_slope = [place for place, number in enumerate(sloping) if number in own]
-    arrays = {name: getattr(excitation, name)[own] for name in ("stiffness", "deflection", "force")}
-    source = excitation.source if len(own) == len(meshes) else None
+    of_stage = [number for number, mesh in enumerate(meshes) if mesh in stage.meshes]
+    of_slope = [place for place, number in enumerate(sloping) if number in of_stage]
+    arrays = {name: getattr(excitation, name)[of_stage] for name in ("stiffness", "deflection", "force")}
+    source = excitation.source if len(of_stage) == len(meshes) else None
     excitation = replace(excitation, **arrays, backlash=play if back else np.zeros_like(play), source=source)
     names = tuple(assembly.contacts[mesh].name for mesh in stage.meshes)
-    chosen = ((turning[0], own), (turning[1], own), (sloped, of_slope))
+    chosen = ((turning[0], of_stage), (turning[1], of_stage), (sloped, of_slope))
     parts = [TurningDirections(*(part[of] for part in _parts(rows))).along(assembly.motions) for rows, of in chosen]
     sense = -1 if planets is not None and planets.speed < 0.0 else 1
     stiffness, moment, start = table[:, of_slope]
@@ -471,8 +471,8 @@ def _elements(
         place, step = count, int(not stage.turns)
         for directions, chosen in groups:
             series = _flank_series(stage, chosen, harmonics, bases, back=directions is stage.back)
-            own = TurningDirections(*(part[chosen] for part in _parts(directions)))
-            made.append(_element(stage, own, basic, place, series, bases, separates=separates))
+            of_chosen = TurningDirections(*(part[chosen] for part in _parts(directions)))
+            made.append(_element(stage, of_chosen, basic, place, series, bases, separates=separates))
             place += step * len(chosen)
         slope = {
             name: FourierSeries(getattr(stage, key)[:, None])

@@ -115,15 +115,15 @@ def _beside_planets(case: GearboxCase) -> Iterator[Finding]:
     """Gears of planets that are shafts of their own, and those beside them that are no mates."""
     planets, mates = carriers(case), {frozenset(pair.shafts) for pair in case.pair}
     gears = [gear for number, pair in enumerate(case.pair) for gear in _of_pair(case, pair, f"pair[{number}]")]
-    told = set[frozenset[str]]()
+    pairs_told = set[frozenset[str]]()
     for first, second in combinations(gears, 2):
         shafts = frozenset((first.shafts[0], second.shafts[0]))
-        if len(shafts) < 2 or shafts in told or shafts in mates or not shafts & planets.keys():
+        if len(shafts) < 2 or shafts in pairs_told or shafts in mates or not shafts & planets.keys():
             continue
         beside = min(first.ends[1], second.ends[1]) - max(first.ends[0], second.ends[0])
         reach = first.tip + second.tip - math.dist(first.axis, second.axis)
         if beside > DISTANCE_TOLERANCE and reach > DISTANCE_TOLERANCE:
-            told.add(shafts)
+            pairs_told.add(shafts)
             text = f"{first.name} reaches into {second.name}, which is no mate of it, by {LENGTH.show(reach)}"
             yield Finding("W-OVERLAP", second.key, text, remedy="fewer planets, or other teeth")
 

@@ -52,7 +52,7 @@ def next_start(model: GearboxModel, passes: Sequence[ContactPass]) -> MeshPositi
     """Extrapolate from passes to the positions that a pass would not change; from one pass to its end."""
     end = passes[-1].end
     latest = passes[-1 - _MEMORY :]
-    starts, ends = (np.array([_lengths(model, one) for one in which]) for which in _both(latest))
+    starts, ends = (np.array([_lengths(model, state) for state in which]) for which in _both(latest))
     changes = ends - starts
     shares = np.linalg.lstsq(np.diff(changes, axis=0).T, changes[-1], rcond=_RANK)[0]
     if not len(shares) or np.abs(shares).max() > _FARTHEST:

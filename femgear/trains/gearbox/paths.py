@@ -143,13 +143,13 @@ def _casing_alone(
     model: GearboxModel, casing: CasingModel, assembly: Assembly, places: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """Mass and stiffness (c, c) of the casing on the springs of its feet."""
-    own = {*casing.stations}
+    stations = {*casing.stations}
     alone = Assembly(
         assembly.names,
         assembly.places,
         assembly.held,
-        tuple(inertia for inertia in assembly.inertias if own.issuperset(inertia.stations)),
-        tuple(beam for beam in model.assembly.beams if own.issuperset(beam.stations)),
+        tuple(inertia for inertia in assembly.inertias if stations.issuperset(inertia.stations)),
+        tuple(beam for beam in model.assembly.beams if stations.issuperset(beam.stations)),
     )
     stiffness = alone.stiffness
     for springs, values in zip(casing.feet, casing.foot_stiffness, strict=True):
@@ -167,11 +167,11 @@ def forces_on_casing(
     Of what the stage is taken out of the structure with, its meshes and pins, the forces themselves count.
     """
     names, model = list(paths.names), state.model
-    own, pins = f"meshes of {stage}", f"pins of {stage}"
+    meshes, pins = f"meshes of {stage}", f"pins of {stage}"
     by_modes = np.einsum("pcn,nm->pcm", paths.forces, structured.motion)
     loss = 1.0 + 2j * model.case.modes.damping_ratio
     ringed = {f"meshes of {part.ring.stage.name}" for part in structured.rings}
-    by_modes[[name in {own, pins, *ringed} for name in names]] = 0.0
+    by_modes[[name in {meshes, pins, *ringed} for name in names]] = 0.0
     for part in structured.rings:
         if (name := f"meshes of {part.ring.stage.name}") in names:
             by_modes[names.index(name)] += loss * (model.assembly.led[:, paths.places].T @ part.force)
@@ -191,7 +191,7 @@ def forces_on_casing(
         if not waves.any():
             continue
         vectors = waves @ assembly.led[6 * station : 6 * station + 6][:, paths.places]
-        for name, chosen in ((own, of_meshes), (pins, ~of_meshes)):
+        for name, chosen in ((meshes, of_meshes), (pins, ~of_meshes)):
             if chosen.any() and name in names:
                 part = np.where(chosen[:, None, None], vectors, 0.0)
                 forces[:, :, names.index(name)] += forces_on_structure(structured.running, response, part)

@@ -65,8 +65,8 @@ class PlanetBranch:
             other.gears.bodies,
         ):
             return False
-        own, others = (one.axes @ _turning(one.angle) for one in (self, other))
-        return bool(np.abs(own - others).max() < DISTANCE_TOLERANCE)
+        axes, others = (branch.axes @ _turning(branch.angle) for branch in (self, other))
+        return bool(np.abs(axes - others).max() < DISTANCE_TOLERANCE)
 
     @property
     def is_free(self) -> bool:
@@ -76,31 +76,31 @@ class PlanetBranch:
 
 def planet_branches(case: GearboxCase) -> list[PlanetBranch]:
     """List the branches of all carriers, in the order of their first planets in the pairs."""
-    of_carrier, found = carriers(case), list[PlanetBranch]()
+    of_carrier, branches = carriers(case), list[PlanetBranch]()
     for carrier in dict.fromkeys(of_carrier.values()):
         pairs = [stage for stage in case.pair if stage.carrier == carrier]
         planets = dict.fromkeys(shaft for stage in pairs for shaft in stage.shafts if of_carrier.get(shaft) == carrier)
         meshing = [[shaft for shaft in stage.shafts if shaft in planets] for stage in pairs]
         for together in connected_sets([*((planet,) for planet in planets), *meshing]):
-            found.append(_branch(case, carrier, [planet for planet in planets if planet in together], pairs))
-    return found
+            branches.append(_branch(case, carrier, [planet for planet in planets if planet in together], pairs))
+    return branches
 
 
 def _branch(case: GearboxCase, carrier: str, planets: list[str], pairs: list[PairSection]) -> PlanetBranch:
-    own = [stage for stage in pairs if not {*stage.shafts}.isdisjoint(planets)]
+    stages = [stage for stage in pairs if not {*stage.shafts}.isdisjoint(planets)]
 
     def words(planet: str) -> list[tuple]:
         """What tells planets of a branch from one another: their meshes, with the names of central mates."""
         return sorted(
             (pair_sizes(stage).teeth[side], pair_sizes(stage).teeth[1 - side], "" if mate in planets else mate)
-            for stage in own
+            for stage in stages
             for side, mate in enumerate(reversed(stage.shafts))
             if stage.shafts[side] == planet
         )
 
     planets = sorted(planets, key=words)
     teeth, shafts, meshes = dict[str, int](), dict[str, str | None](), list[tuple[tuple[str, str, int], str]]()
-    for stage in own:
+    for stage in stages:
         names = []
         for shaft, count in zip(stage.shafts, pair_sizes(stage).teeth, strict=True):
             name = f"{planets.index(shaft) + 1 if shaft in planets else shaft} {count}"
@@ -131,12 +131,12 @@ def alike_branches(case: GearboxCase) -> list[list[PlanetBranch]]:
     """Collect the branches that are alike, each set in the order of their angles from its first one on."""
     sets = list[list[PlanetBranch]]()
     for branch in planet_branches(case):
-        alike = next((one for one in sets if one[0].is_alike(branch)), None)
+        alike = next((group for group in sets if group[0].is_alike(branch)), None)
         if alike is None:
             sets.append([branch])
         else:
             alike.append(branch)
-    return [sorted(one, key=lambda branch: _beyond(branch, one[0])) for one in sets]
+    return [sorted(group, key=lambda branch: _beyond(branch, group[0])) for group in sets]
 
 
 def _beyond(branch: PlanetBranch, first: PlanetBranch) -> float:
@@ -178,25 +178,25 @@ def running_sets(case: GearboxCase) -> list[RunningSet]:
     All branches of a carrier are alike, nothing but bearings on the carrier and gears holds their planets, and no gear
     has errors that turn.
     """
-    planets, found = carriers(case), list[RunningSet]()
+    planets, running = carriers(case), list[RunningSet]()
     sets = alike_branches(case)
     for carrier in dict.fromkeys(planets.values()):
         on_carrier = [alike for alike in sets if alike[0].carrier == carrier]
-        own = {planet for alike in on_carrier for branch in alike for planet in branch.planets}
-        held = any(not own.isdisjoint(coupling.between) for coupling in case.coupling)
-        held |= any(stage.carrier != carrier and not own.isdisjoint(stage.shafts) for stage in case.pair)
+        planets_in_sets = {planet for alike in on_carrier for branch in alike for planet in branch.planets}
+        held = any(not planets_in_sets.isdisjoint(coupling.between) for coupling in case.coupling)
+        held |= any(stage.carrier != carrier and not planets_in_sets.isdisjoint(stage.shafts) for stage in case.pair)
         members = {name for stage in case.planetary for name in (stage.sun, stage.carrier, stage.ring)}
-        held |= not own.isdisjoint({*planets.values(), *members, *case.operation.fixed})
+        held |= not planets_in_sets.isdisjoint({*planets.values(), *members, *case.operation.fixed})
         held |= any(stage.carrier == carrier and _deviates(stage) for stage in case.pair)
-        held |= any(bearing.outer_shaft in own for bearing in case.bearing)
-        held |= any(bearing.shaft in own and bearing.outer_shaft != carrier for bearing in case.bearing)
+        held |= any(bearing.outer_shaft in planets_in_sets for bearing in case.bearing)
+        held |= any(bearing.shaft in planets_in_sets and bearing.outer_shaft != carrier for bearing in case.bearing)
         if held or len(on_carrier) != 1:
             continue
         pins = [_pins(case, branch) for branch in on_carrier[0]]
         if all([where for _, where in branch] == [where for _, where in pins[0]] for branch in pins):
             numbers = tuple(tuple(number for number, _ in branch) for branch in pins)
-            found.append(RunningSet(tuple(on_carrier[0]), numbers))
-    return found
+            running.append(RunningSet(tuple(on_carrier[0]), numbers))
+    return running
 
 
 def _deviates(stage: PairSection) -> bool:
@@ -276,9 +276,9 @@ def describe_branches(case: GearboxCase) -> Iterator[Block]:
             marks = {} if first.is_free else timing_marks(first.gears, place * step)
             bodies = {second: gear for gear, second in first.gears.bodies}
             for number, planet in enumerate(branch.planets, start=1):
-                own = [gear for gear in first.gears.teeth if gear.startswith(f"{number} ") and gear not in bodies]
-                for gear in own:
-                    of = f"{planet}, {first.gears.teeth[gear]} teeth" if len(own) > 1 else planet
+                gears = [gear for gear in first.gears.teeth if gear.startswith(f"{number} ") and gear not in bodies]
+                for gear in gears:
+                    of = f"{planet}, {first.gears.teeth[gear]} teeth" if len(gears) > 1 else planet
                     turned = f"{float(360 * marks[gear]):.4f}" if gear in marks else "-"
                     at = "-" if first.is_free else f"{place} of {1 / step}"
                     rows.append((of, f"{math.degrees(angle):.4f}", at, turned))

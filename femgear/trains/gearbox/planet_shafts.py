@@ -170,7 +170,7 @@ def standing_planets(case: GearboxCase) -> Iterator[Finding]:
     """Tell that planets stand at one angle of a carrier that turns (W-STANDING)."""
     if not carriers(case):
         return
-    running = {found.branches[0].carrier for found in running_sets(case)}
+    running = {running_set.branches[0].carrier for running_set in running_sets(case)}
     for name in turning_carriers(case, gearbox_flow(case)):
         if name in running:
             continue

@@ -74,7 +74,9 @@ class BoxFlow:
         shares = {}
         for names in self.side_by_side:
             passed = [self._passed(name) for name in names]
-            shares |= {name: one / math.fsum(passed) for name, one in zip(names, passed, strict=True) if any(passed)}
+            shares |= {
+                name: torque / math.fsum(passed) for name, torque in zip(names, passed, strict=True) if any(passed)
+            }
         return shares
 
     def _passed(self, name: str) -> float:
@@ -107,29 +109,31 @@ class BoxFlow:
     @property
     def mesh_frequency(self) -> dict[str, float]:
         """Mesh frequency of every stage [Hz]."""
-        return {name: next(iter(one.mesh_frequency.values())) for name, one in self.frequencies.items()}
+        return {name: next(iter(frequencies.mesh_frequency.values())) for name, frequencies in self.frequencies.items()}
 
     @property
     def planet_speed(self) -> dict[str, float]:
         """Speed of the planets of every planetary stage [rad/s], against the casing."""
         return {
-            name: next(iter(one.planet_speed.values())) for name, one in self.frequencies.items() if one.planet_speed
+            name: next(iter(frequencies.planet_speed.values()))
+            for name, frequencies in self.frequencies.items()
+            if frequencies.planet_speed
         }
 
 
 def stage_conditions(case: GearboxCase) -> list[SpeedCondition]:
     """List the kinematic conditions of all stages, pairs first."""
-    found = []
+    conditions = []
     for stage in case.pair:
         sizes, (first, second), (teeth_1, teeth_2) = pair_sizes(stage), stage.shafts, pair_sizes(stage).teeth
-        found.append(
+        conditions.append(
             pair_condition(stage.name, first, second, teeth_1, teeth_2, internal=sizes.internal, carrier=stage.carrier)
         )
     for stage in case.planetary:
         sun, _, ring = set_sizes(stage).teeth
         members = [None if name == CASING else name for name in (stage.sun, stage.carrier, stage.ring)]
-        found.append(planetary_condition(stage.name, members[0], members[1], members[2], sun, ring))
-    return found
+        conditions.append(planetary_condition(stage.name, members[0], members[1], members[2], sun, ring))
+    return conditions
 
 
 def gearbox_flow(case: GearboxCase, load_case: LoadCaseSection | None = None) -> BoxFlow:
@@ -202,19 +206,19 @@ def _independent(case: GearboxCase, conditions, held, joined, load_case: LoadCas
     """Choose of the given speeds those from which the others follow."""
     links = tuple(map(tuple, joined))
     graph = ShaftGraph(tuple(shaft.name for shaft in case.shaft), tuple(conditions), tuple(held), links)
-    found: list[str] = []
+    independent: list[str] = []
     for name in load_case.speed:
-        turning = graph.speeds([*found, name])
-        known = graph.group[name] in {graph.group[other] for other in found} | graph.standing
-        if not turning.relations and not known:
-            found.append(name)
-    return tuple(found)
+        turning = graph.speeds([*independent, name])
+        is_known = graph.group[name] in {graph.group[other] for other in independent} | graph.standing
+        if not turning.relations and not is_known:
+            independent.append(name)
+    return tuple(independent)
 
 
 def port_shafts(case: GearboxCase) -> dict[str, str]:
     """List the shafts of loads, and of shafts that are one rigid body, by the names of these."""
-    found = {shaft.name: shaft.name for shaft in case.shaft if not shaft.part}
-    return found | {load.name: load.shaft for load in case.load}
+    shafts = {shaft.name: shaft.name for shaft in case.shaft if not shaft.part}
+    return shafts | {load.name: load.shaft for load in case.load}
 
 
 def _locate(error: FemgearError, case: GearboxCase, load_case: LoadCaseSection) -> None:

@@ -75,38 +75,38 @@ class GearboxResponseResult(StageResult):
 
     def contents(self) -> Contents:
         """Collect the contents of dynamics.nc or runup.nc."""
-        found = self.found
-        model = found.deflection.model
+        response = self.found
+        model = response.deflection.model
         sensors, bearings = len(gearbox_sensors(model.case)), len(model.bearings)
         forces = slice(sensors, sensors + 3 * bearings)
-        variables = _of_stages(found) | _of_lines(found)
-        moved = accelerations(found, sensors)
-        variables |= _at_sensors(found, moved) if sensors else {}
-        variables |= {} if self.longer is None else _by_longer(found, self.longer, moved)
-        variables |= {} if self.resonances is None else resonance_variables(found, self.resonances, moved)
-        of_bearings = {stage.name: stage.motion[:, forces] for stage in found.stages}
-        size = (len(found.speed), bearings, 3)
-        rms = level(found, of_bearings).reshape(size)
+        variables = _of_stages(response) | _of_lines(response)
+        moved = accelerations(response, sensors)
+        variables |= _at_sensors(response, moved) if sensors else {}
+        variables |= {} if self.longer is None else _by_longer(response, self.longer, moved)
+        variables |= {} if self.resonances is None else resonance_variables(response, self.resonances, moved)
+        of_bearings = {stage.name: stage.motion[:, forces] for stage in response.stages}
+        size = (len(response.speed), bearings, 3)
+        rms = level(response, of_bearings).reshape(size)
         text = "root mean square of the bearing force about its mean; NaN of rigid bearings"
         variables["bearing_force_rms"] = ("speed bearing axis", rms, "N", text)
-        of_feet = {stage.name: stage.motion[:, forces.stop :] for stage in found.stages}
+        of_feet = {stage.name: stage.motion[:, forces.stop :] for stage in response.stages}
         feet = () if model.casing is None else model.casing.feet
         if feet:
-            size = (len(found.speed), len(feet), 3)
+            size = (len(response.speed), len(feet), 3)
             text = "root mean square of the force of the foot about its mean; NaN of rigid feet"
-            variables["foot_force_rms"] = ("speed foot axis", level(found, of_feet).reshape(size), "N", text)
+            variables["foot_force_rms"] = ("speed foot axis", level(response, of_feet).reshape(size), "N", text)
         if self.whole:
             text = "force of the bearing on the shaft, amplitude of the line"
             lines = np.concatenate(list(of_bearings.values()), axis=2)
-            lines = lines.reshape(len(found.speed), bearings, 3, -1)
+            lines = lines.reshape(len(response.speed), bearings, 3, -1)
             variables |= _complex("bearing_force", "speed bearing axis line", lines, "N", text)
-        variables |= {} if self.frictionless is None else _by_friction(found, self.frictionless, sensors, bearings)
-        variables |= _of_several(found)
+        variables |= {} if self.frictionless is None else _by_friction(response, self.frictionless, sensors, bearings)
+        variables |= _of_several(response)
         text = "exciting stage that the mesh is of; empty of others"
-        variables["stage_of_mesh"] = ("mesh", _stages_of_meshes(found), "1", text)
-        names = [stage.name for stage in found.stages]
+        variables["stage_of_mesh"] = ("mesh", _stages_of_meshes(response), "1", text)
+        names = [stage.name for stage in response.stages]
         coords: dict[str, Any] = {
-            "speed": (("speed",), found.speed / RPM, "rpm", f"speed of {found.reference}"),
+            "speed": (("speed",), response.speed / RPM, "rpm", f"speed of {response.reference}"),
             "stage": (("stage",), names, "1", "stage that excites"),
             "other_stage": (("other_stage",), names, "1", "stage that excites"),
             "kind": (("kind",), list(_KINDS), "1", "kind of mesh; of a pair the first one"),
@@ -116,18 +116,18 @@ class GearboxResponseResult(StageResult):
         }
         if sensors:
             coords["sensor"] = (("sensor",), [sensor.name for sensor in gearbox_sensors(model.case)], "1", "sensor")
-        if found.paths:
-            coords["path"] = (("path",), list(found.paths), "1", "way into the casing")
+        if response.paths:
+            coords["path"] = (("path",), list(response.paths), "1", "way into the casing")
         if feet:
             coords["foot"] = (("foot",), [foot.name for foot in feet], "1", "foot of the casing")
         attrs = {
             "title": "response of the gearbox to its stages",
-            "up_to": found.up_to,
+            "up_to": response.up_to,
             "compared_to": math.nan if self.longer is None else self.longer.up_to,
             "most_harmonics": model.case.dynamics.mesh_harmonics or 0,
-            "reference": found.reference,
-            "missing": ", ".join(found.missing),
-            "rigid": ", ".join(_rigid_bodies(found)),
+            "reference": response.reference,
+            "missing": ", ".join(response.missing),
+            "rigid": ", ".join(_rigid_bodies(response)),
             "unresolved_resonances": self.unresolved,
         }
         used = {dim for entry in variables.values() for dim in entry[0].split()}
@@ -167,9 +167,9 @@ def _outer_levels(response: GearboxResponse, moved: dict[str, np.ndarray]) -> np
     return shares
 
 
-def _by_friction(found: GearboxResponse, without: GearboxResponse, sensors: int, bearings: int) -> dict[str, tuple]:
+def _by_friction(rubbing: GearboxResponse, without: GearboxResponse, sensors: int, bearings: int) -> dict[str, tuple]:
     """Change by friction of the levels at sensors, without any of bearing forces, on rigid bearings of meshes [dB]."""
-    every, forces = (found, without), slice(sensors, sensors + 3 * bearings)
+    every, forces = (rubbing, without), slice(sensors, sensors + 3 * bearings)
     if not sensors:
         each = (
             level(response, {stage.name: stage.motion[:, forces] for stage in response.stages}) for response in every
@@ -189,10 +189,10 @@ def _by_friction(found: GearboxResponse, without: GearboxResponse, sensors: int,
         for stage in without.stages
         for at, (harmonic, band) in enumerate(zip(stage.harmonic, stage.side_band, strict=True))
     }
-    none = np.zeros((len(found.speed), sensors))
+    none = np.zeros((len(rubbing.speed), sensors))
     lines = [
         quiet.get((stage.name, harmonic, band), none)
-        for stage in found.stages
+        for stage in rubbing.stages
         for harmonic, band in zip(stage.harmonic, stage.side_band, strict=True)
     ]
     text = "amplitude of the line without friction"
@@ -266,8 +266,8 @@ def _by_kind(response: GearboxResponse, values: Callable[[StageLines], np.ndarra
     """Values (v, stages, 2) of the kinds of meshes of all stages; NaN where a pair has no second mesh."""
     whole = np.full((len(response.speed), len(response.stages), 2), np.nan)
     for number, stage in enumerate(response.stages):
-        own = values(stage)
-        whole[:, number, : own.shape[1]] = own
+        of_stage = values(stage)
+        whole[:, number, : of_stage.shape[1]] = of_stage
     return whole
 
 
@@ -457,8 +457,10 @@ def _cross_finding(data: xr.Dataset) -> Finding:
 
 def _of_speeds(speeds: np.ndarray, chosen: np.ndarray) -> str:
     """Words for some of the speeds [rpm]."""
-    some = speeds[chosen]
-    return f"{some[0]:.5g} rpm" if len(some) == 1 else f"{len(some)} speeds, {some.min():.5g} to {some.max():.5g} rpm"
+    shown = speeds[chosen]
+    return (
+        f"{shown[0]:.5g} rpm" if len(shown) == 1 else f"{len(shown)} speeds, {shown.min():.5g} to {shown.max():.5g} rpm"
+    )
 
 
 def describe_gearbox_response(data: xr.Dataset, title: str = "Response of the stages") -> Block:

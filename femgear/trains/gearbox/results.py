@@ -90,7 +90,7 @@ class DeflectionResult(StageResult):
         if case is self.case:
             return self
         states, estimates = (
-            tuple(replace(state, model=replace(state.model, case=case)) for state in every)
+            tuple(replace(solved, model=replace(solved.model, case=case)) for solved in every)
             for every in (self.states, self.estimates)
         )
         return replace(self, case=case, states=states, estimates=estimates)
@@ -127,20 +127,20 @@ class DeflectionResult(StageResult):
         case, state, every = self.case, self.state, self.states
         assembly, load_case, mesh = state.model.assembly, "load_case", "load_case mesh"
         shown = state.model.places
-        slopes, widths = np.array([state.mesh_slope for state in every]), _mesh_widths(state)
-        face = np.array([_face_factors(state) for state in every])
+        slopes, widths = np.array([solved.mesh_slope for solved in every]), _mesh_widths(state)
+        face, settled = np.array([_face_factors(solved) for solved in every]), [solved.settled for solved in every]
         variables = {
             "speed": ("load_case shaft", _speeds(every, case) / RPM, "rpm", "speed of the shaft"),
             "torque": ("load_case port", _torques(every), "N m", "torque from outside, reactions of outputs too"),
             "mesh_frequency": ("load_case stage", _of_stages(every, "mesh_frequency"), "Hz", "mesh frequency"),
             "planet_load_factor": (
                 "load_case stage",
-                [[_planet_factor(state, stage) for stage in state.model.stages] for state in every],
+                [[_planet_factor(solved, stage) for stage in solved.model.stages] for solved in every],
                 "1",
                 "K_gamma: largest load of the planets over their mean; NaN of pairs without planets",
             ),
             "share": (load_case, running_shares(case.operation.load_case), "1", "share of the running time"),
-            "mesh_force": (mesh, [state.mesh_force for state in every], "N", "force along the normal of the flanks"),
+            "mesh_force": (mesh, [solved.mesh_force for solved in every], "N", "force along the normal of the flanks"),
             "mesh_slope": (mesh, slopes, "rad", "slope of the approach along the width, closer at z > 0 positive"),
             "mesh_misalignment": (
                 mesh,
@@ -159,24 +159,19 @@ class DeflectionResult(StageResult):
             "transmission_error": (mesh, _errors(every), "m", "peak to peak of the static transmission error"),
             "displacement": (
                 "load_case station motion",
-                np.array([state.motion.reshape(-1, 6)[shown] for state in every]),
+                np.array([solved.motion.reshape(-1, 6)[shown] for solved in every]),
                 "m",
                 "motion of the station: x, y, z (m), tilts and rotation (rad)",
             ),
             "place": ("station axis", assembly.places[shown], "m", "place of the station"),
-            "passes": (load_case, [len(state.slopes) - 1 for state in every], "1", "passes of contact and system"),
-            "settled": (
-                load_case,
-                [state.settled for state in every],
-                "1",
-                "whether slopes and mesh forces have settled",
-            ),
-            "out_of_balance": (load_case, [state.residual for state in every], "1", "force out of balance, relative"),
+            "passes": (load_case, [len(solved.slopes) - 1 for solved in every], "1", "passes of contact and system"),
+            "settled": (load_case, settled, "1", "whether slopes and mesh forces have settled"),
+            "out_of_balance": (load_case, [solved.residual for solved in every], "1", "force out of balance, relative"),
         }
         variables |= _of_bearings(every, state) | _distribution(state) | _of_estimates(self.estimates)
         variables |= casing_variables(every) | static_sensor_variables(every) | _shares_side_by_side(every)
         coords = {
-            "load_case": _names("load_case", [load_case.name for load_case in case.operation.load_case], "load case"),
+            "load_case": _names("load_case", [section.name for section in case.operation.load_case], "load case"),
             "shaft": _names("shaft", [shaft.name for shaft in case.shaft], "shaft"),
             "port": _names("port", [*state.model.flow.port_torque], "load"),
             "stage": _names("stage", [stage.name for stage in state.model.stages], "stage"),
@@ -232,11 +227,11 @@ def _mesh_widths(state: Deflection) -> np.ndarray:
 
 def _per_mesh(state: Deflection, value) -> np.ndarray:
     """Values of every mesh (M,); NaN where teeth are not computed."""
-    found = np.full(len(state.model.assembly.contacts), np.nan)
+    per_mesh = np.full(len(state.model.assembly.contacts), np.nan)
     for stage in state.model.stages:
         if stage.name in state.contacts:
-            found[list(stage.meshes)] = value(state.contacts[stage.name])
-    return found
+            per_mesh[list(stage.meshes)] = value(state.contacts[stage.name])
+    return per_mesh
 
 
 def _face_factors(state: Deflection) -> np.ndarray:
@@ -276,7 +271,7 @@ def _errors(states) -> np.ndarray:
 def _of_bearings(every: Sequence[Deflection], state: Deflection) -> dict[str, tuple]:
     """Forces, motions, stiffness and lives of all bearings in all load cases."""
     bearing, count = "load_case bearing", len(state.model.case.bearing)
-    forces = np.array([state.bearing_force for state in every]).reshape(len(every), count, 6)
+    forces = np.array([solved.bearing_force for solved in every]).reshape(len(every), count, 6)
     return {
         "bearing_force": (f"{bearing} motion", forces, "N", "force on the shaft (N), moments about x, y, z (N m)"),
         "radial_force": (bearing, np.hypot(forces[..., 0], forces[..., 1]), "N", "radial bearing force"),
@@ -289,14 +284,14 @@ def _of_bearings(every: Sequence[Deflection], state: Deflection) -> dict[str, tu
         ),
         "bearing_displacement": (
             "load_case bearing axis",
-            np.array([bearing_motions(state.model, state.motion) for state in every]),
+            np.array([bearing_motions(solved.model, solved.motion) for solved in every]),
             "m",
             "motion of the shaft at the bearing",
         ),
         "bearing_place": ("bearing axis", bearing_places(state.model), "m", "place of the bearing"),
         "slack": (
             f"{bearing} motion",
-            np.array([slack_bearings(state) for state in every]).reshape(len(every), count, 6).astype(float),
+            np.array([slack_bearings(solved) for solved in every]).reshape(len(every), count, 6).astype(float),
             "1",
             "1 where the bearing holds no such motion for want of load and its shaft is free; else 0",
         ),
@@ -359,25 +354,25 @@ class GearboxModesResult(StageResult):
 
     def contents(self) -> Contents:
         """Collect the contents of modes.nc."""
-        found = self.found
-        modes, model, campbell = found.modes, found.deflection.model, found.campbell
+        solved = self.found
+        modes, model, campbell = solved.modes, solved.deflection.model, solved.campbell
         critical, shown, names = campbell.critical, model.places, [stage.name for stage in model.stages]
         variables = mode_entries(modes) | {
-            "energy": ("member mode", found.kinetic, "1", "share of the member in the kinetic energy"),
-            "strain": ("part mode", found.strain, "1", "share of the part in the strain energy"),
-            "main_member": ("mode", _largest(found.members, found.kinetic), "1", "member with most kinetic energy"),
-            "main_part": ("mode", _largest(found.parts, found.strain), "1", "part with most strain energy"),
+            "energy": ("member mode", solved.kinetic, "1", "share of the member in the kinetic energy"),
+            "strain": ("part mode", solved.strain, "1", "share of the part in the strain energy"),
+            "main_member": ("mode", _largest(solved.members, solved.kinetic), "1", "member with most kinetic energy"),
+            "main_part": ("mode", _largest(solved.parts, solved.strain), "1", "part with most strain energy"),
             "motion": (
                 "station way mode",
-                found.motion.reshape(len(model.assembly.names), 6, -1)[shown],
+                solved.motion.reshape(len(model.assembly.names), 6, -1)[shown],
                 "kg^-1/2",
                 "mode shape of unit mass; tilts and rotations in kg^-1/2 m^-1",
             ),
-            "planet_kind": ("mode", list(found.stages.kinds), "1", "class of the mode by what planets and shafts do"),
-            "stage_energy": ("stage mode", found.stages.energy, "1", "share of the stage in the kinetic energy"),
-            "main_stage": ("mode", _largest(names, found.stages.energy), "1", "stage with most kinetic energy"),
+            "planet_kind": ("mode", list(solved.stages.kinds), "1", "class of the mode by what planets and shafts do"),
+            "stage_energy": ("stage mode", solved.stages.energy, "1", "share of the stage in the kinetic energy"),
+            "main_stage": ("mode", _largest(names, solved.stages.energy), "1", "stage with most kinetic energy"),
             "place": ("station axis", model.assembly.places[shown], "m", "place of the station"),
-            "order": ("line", list(found.orders.values()), "1", f"over the turn of {found.reference}"),
+            "order": ("line", list(solved.orders.values()), "1", f"over the turn of {solved.reference}"),
             "campbell_frequency": (
                 "campbell_speed branch",
                 campbell.frequency,
@@ -392,23 +387,23 @@ class GearboxModesResult(StageResult):
             ),
             "critical_frequency": ("crossing", [crossing.frequency for crossing in critical], "Hz", "frequency there"),
         }
-        variables |= modal_sensor_variables(model, found.at_sensors)
+        variables |= modal_sensor_variables(model, solved.at_sensors)
         coords = {
             **coordinates(mode=np.arange(1, len(modes.frequency) + 1)),
-            "member": _names("member", found.members, "shaft, or planets of a stage"),
-            "part": _names("part", found.parts, "part that is strained"),
+            "member": _names("member", solved.members, "shaft, or planets of a stage"),
+            "part": _names("part", solved.parts, "part that is strained"),
             "stage": _names("stage", names, "stage"),
             "station": _names(
                 "station", np.array(model.assembly.names)[shown].tolist(), "station of a shaft, or planet"
             ),
             "way": _names("way", MOTIONS, "motion"),
             "axis": _names("axis", "xyz", "coordinate"),
-            "line": _names("line", found.orders, "excitation"),
-            "campbell_speed": (("campbell_speed",), campbell.speed / RPM, "rpm", f"speed of {found.reference}"),
+            "line": _names("line", solved.orders, "excitation"),
+            "campbell_speed": (("campbell_speed",), campbell.speed / RPM, "rpm", f"speed of {solved.reference}"),
             **sensor_coordinates(model),
         }
-        speed = abs(model.flow.speed[found.reference]) / RPM
-        attrs = {"title": "modes of the gearbox", "reference": found.reference, "speed": speed}
+        speed = abs(model.flow.speed[solved.reference]) / RPM
+        attrs = {"title": "modes of the gearbox", "reference": solved.reference, "speed": speed}
         return Contents(variables, coords, attrs | {"ways": len(model.turns)})
 
 
@@ -419,35 +414,38 @@ def _largest(names, shares: np.ndarray) -> list[str]:
 def describe_deflection(data: xr.Dataset) -> tuple[Block, ...]:
     """Tabulate meshes and bearings of deflection.nc at the chosen load case."""
     at = int(data.attrs["load_case"])
-    one = data.isel(load_case=at)
+    load_case = data.isel(load_case=at)
     count = data.sizes["load_case"]
     name = f" in {named_load_case(str(data['load_case'].values[at]))}" if count > 1 else ""
     meshes = {
         "mesh": lambda i: str(data["mesh"].values[i]),
-        "force [N]": lambda i: f"{float(one['mesh_force'].values[i]):.5g}",
+        "force [N]": lambda i: f"{float(load_case['mesh_force'].values[i]):.5g}",
         "misaligned [um]": lambda i: (
-            f"{1e6 * float(one['mesh_misalignment'].values[i]):+.3f}" + _range(one, "misalignment", i, "+.2f", 1e6)
+            f"{1e6 * float(load_case['mesh_misalignment'].values[i]):+.3f}"
+            + _range(load_case, "misalignment", i, "+.2f", 1e6)
         ),
         "K_Hbeta": lambda i: (
-            life_text(one["face_load_factor"].values[i], ".3f") + _range(one, "face_load_factor", i, ".3f")
+            life_text(load_case["face_load_factor"].values[i], ".3f") + _range(load_case, "face_load_factor", i, ".3f")
         ),
-        "k [N/um]": lambda i: f"{1e-6 * float(one['mesh_stiffness'].values[i]):.4g}",
-        "STE p-p [um]": lambda i: life_text(1e6 * one["transmission_error"].values[i], ".3f"),
+        "k [N/um]": lambda i: f"{1e-6 * float(load_case['mesh_stiffness'].values[i]):.4g}",
+        "STE p-p [um]": lambda i: life_text(1e6 * load_case["transmission_error"].values[i], ".3f"),
     }
     bearings = {
         "bearing": lambda i: str(data["bearing"].values[i]),
-        "radial [N]": lambda i: f"{float(one['radial_force'].values[i]):.5g}",
-        "axial [N]": lambda i: f"{float(one['axial_force'].values[i]):+.5g}",
-        "L10 [h]": lambda i: life_text(one["rating_life"].values[i]),
-        "L10r [h]": lambda i: life_text(one["reference_life"].values[i]),
+        "radial [N]": lambda i: f"{float(load_case['radial_force'].values[i]):.5g}",
+        "axial [N]": lambda i: f"{float(load_case['axial_force'].values[i]):+.5g}",
+        "L10 [h]": lambda i: life_text(load_case["rating_life"].values[i]),
+        "L10r [h]": lambda i: life_text(load_case["reference_life"].values[i]),
     }
-    if np.isfinite(one["modified_life"].values).any():
-        bearings["a_ISO L10r [h]"] = lambda i: life_text(one["modified_life"].values[i])
+    if np.isfinite(load_case["modified_life"].values).any():
+        bearings["a_ISO L10r [h]"] = lambda i: life_text(load_case["modified_life"].values[i])
     brackets = ""
     if "estimate_factor" in data:
         brackets = ", in brackets with half and twice the stiffness of estimated bearings"
-    passes = int(one["passes"])
-    note = f"forces balance to {float(one['out_of_balance']):.1g}" + (f", settled in {passes} passes" if passes else "")
+    passes = int(load_case["passes"])
+    note = f"forces balance to {float(load_case['out_of_balance']):.1g}" + (
+        f", settled in {passes} passes" if passes else ""
+    )
     return (
         tabulate(f"Meshes{name}{brackets}", range(data.sizes["mesh"]), meshes, (note,)),
         tabulate(f"Bearings{name}", range(data.sizes["bearing"]), bearings),
@@ -465,8 +463,8 @@ def _range(data: Any, name: str, mesh: int, how: str, factor: float = 1.0) -> st
     """Write the range of a value of a mesh with all stiffnesses of estimated bearings, nothing without estimates."""
     if f"estimate_{name}" not in data:
         return ""
-    own = data["mesh_misalignment" if name == "misalignment" else name].values[mesh]
-    values = factor * np.sort([own, *data[f"estimate_{name}"].values[:, mesh]])
+    of_meshes = data["mesh_misalignment" if name == "misalignment" else name].values[mesh]
+    values = factor * np.sort([of_meshes, *data[f"estimate_{name}"].values[:, mesh]])
     return "" if np.isnan(values).any() else f" ({values[0]:{how}} to {values[-1]:{how}})"
 
 
@@ -520,9 +518,9 @@ def _idle_planets(data: xr.Dataset) -> Iterator[Finding]:
     """Name planets that carry nothing where others of their set do (W-OPEN)."""
     meshes, force = [str(name) for name in data["mesh"].values], data["mesh_force"].values
     for stage, factor in zip(data["stage"].values, data["planet_load_factor"].values.T, strict=True):
-        own = [number for number, name in enumerate(meshes) if name.startswith(f"{stage} sun-planet ")]
+        of_stage = [number for number, name in enumerate(meshes) if name.startswith(f"{stage} sun-planet ")]
         for case in np.flatnonzero(np.isfinite(factor)):
-            idle = [meshes[number] for number in own if force[case, number] <= _IDLE * force[case, own].max()]
+            idle = [meshes[number] for number in of_stage if force[case, number] <= _IDLE * force[case, of_stage].max()]
             if idle:
                 text = f"{', '.join(idle)} carry nothing in {named_load_case(str(data['load_case'].values[case]))}"
                 remedy = "smaller errors of the pins, or members that give way"
@@ -660,8 +658,8 @@ def _given_planets(case: GearboxCase) -> Iterator[Finding]:
             if room <= 2.0 * planet_radius(sizes):
                 text, severity = "neighbouring planets overlap by their pitch circles", FAULT
                 remedy = "take fewer planets, or smaller ones"
-            known = {"limit": ">= one module", "severity": severity, "remedy": remedy}
-            yield Finding("W-NEIGHBOURS", f"planetary[{i}].gears", text, **known)
+            options = {"limit": ">= one module", "severity": severity, "remedy": remedy}
+            yield Finding("W-NEIGHBOURS", f"planetary[{i}].gears", text, **options)
 
 
 _HOLDS = ("support_stiffness", "bearing_stiffness", "tilt_stiffness", "foundation_radial", "foundation_tangential")
@@ -674,9 +672,9 @@ _WITHOUT_EFFECT = (
 
 
 def _without_effect(tables: dict, *, elastic_ring: bool) -> list[str]:
-    found = [f"{section}.{key}" for section, key in _WITHOUT_EFFECT if key in tables.get(section, {})]
+    entries = [f"{section}.{key}" for section, key in _WITHOUT_EFFECT if key in tables.get(section, {})]
     for gear in ("gear_1", "gear_2", "sun", "ring", "carrier"):
         section = tables.get(gear)
         holds = [key for key in _HOLDS if not (gear == "ring" and elastic_ring and key.startswith("foundation"))]
-        found += [f"{gear}.{key}" for key in holds if isinstance(section, dict) and key in section]
-    return found
+        entries += [f"{gear}.{key}" for key in holds if isinstance(section, dict) and key in section]
+    return entries

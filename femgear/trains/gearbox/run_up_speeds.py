@@ -103,13 +103,13 @@ def gearbox_resonances(
         harmonics = int(np.clip(up_to / (mesh_turns * slowest), 1, most))
         output = at_sensors if at_sensors.shape[1] else own_modes.mesh_deflection.T
         forces = modal_forces(own_modes, excitation, harmonics, output=output)
-        met = crossings(forces, mesh_turns * slowest, mesh_turns * fastest, up_to)
-        heard = forces.heard[met.row, met.harmonic - 1]
-        modal = forces.damping_ratio[met.row], met.harmonic, forces.frequency[met.row]
-        parts.append(np.array([met.mesh_frequency / mesh_turns, heard, *modal]))
-        names += [joint.get(stage.name, stage.name)] * len(met.row)
-    speed, heard, damping, harmonic, frequency = np.concatenate(parts, axis=1)
-    return GearboxResonances(speed, heard, damping, tuple(names), harmonic.astype(int), frequency)
+        crossed = crossings(forces, mesh_turns * slowest, mesh_turns * fastest, up_to)
+        strength = forces.heard[crossed.row, crossed.harmonic - 1]
+        modal = forces.damping_ratio[crossed.row], crossed.harmonic, forces.frequency[crossed.row]
+        parts.append(np.array([crossed.mesh_frequency / mesh_turns, strength, *modal]))
+        names += [joint.get(stage.name, stage.name)] * len(crossed.row)
+    speed, strength, damping, harmonic, frequency = np.concatenate(parts, axis=1)
+    return GearboxResonances(speed, strength, damping, tuple(names), harmonic.astype(int), frequency)
 
 
 def _with_meshes(modes: Modes, state: Deflection, stage: StageModel, stiffness: np.ndarray, mean: np.ndarray) -> Modes:

@@ -104,7 +104,7 @@ def branch_stage(
     stages = {stage.name: stage for stage in model.stages}
     kinds = [[stages[name] for name in names] for names in running.kinds]
     stations = [branch_stations(model, branch.planets) for branch in running.branches]
-    gone, meshes = {at for own in stations for at in own}, {s.meshes[0] for names in kinds for s in names}
+    gone, meshes = {at for of_branch in stations for at in of_branch}, {s.meshes[0] for names in kinds for s in names}
     modes, motion, inner = structure_modes(state, structure_apart(state, gone, meshes, rings), rings)
     frequencies = [model.flow.mesh_frequency[names[0].name] for names in kinds]
     together = kinds_together(model, running, kind)
@@ -114,10 +114,10 @@ def branch_stage(
     pins, of_pin = first.pins()
     excitation, paths, sense = kinds_in_time(state, running, [kinds[n] for n in together], kind, excitations, phases)
     mean = excitation.stiffness.mean(axis=1).reshape(len(together), -1).mean(axis=1)
-    stiffness = np.array([one.stiffness for one in (*points, *pins)])
+    stiffness = np.array([point.stiffness for point in (*points, *pins)])
     stiffness[: len(together)] = mean
     free, damping = first.free, model.case.modes.damping_ratio
-    rows = [one.row for one in (*points, *pins)]
+    rows = [point.row for point in (*points, *pins)]
     carrier = model.case.shaft_named(running.branches[0].carrier)
     orbit = Orbit(running.angles[0], np.array([*carrier.axis, 0.0]))
     shape = np.array([shape_waves(row, orbit, motion, model.assembly.places) for row in rows])
@@ -139,7 +139,7 @@ def branch_stage(
         mass[both],
         gyroscopic[both],
         turning[both],
-        np.array([one.approach for one in (*points, *pins)]).T[free],
+        np.array([point.approach for point in (*points, *pins)]).T[free],
         stiffness,
         np.full(len(stiffness), 2.0 * damping),
         excitation,
@@ -149,7 +149,7 @@ def branch_stage(
         rubbing=rubbing,
         elastic=elastic[both],
     )
-    own = together.index(kind)
+    of_branch = together.index(kind)
     forces = BranchForces(
         {s.meshes[0]: (n, of_mesh[order.index(k)]) for k, names in enumerate(kinds) for n, s in enumerate(names)},
         {
@@ -157,7 +157,7 @@ def branch_stage(
             for n, numbers in enumerate(running.pins)
             for at, bearing in enumerate(numbers)
         },
-        slice(own, own + 1),
+        slice(of_branch, of_branch + 1),
     )
     of_meshes = np.array([True] * len(points) + [False] * len(pins) + [True] * (len(rows) - len(points) - len(pins)))
     return StructuredStage(stage, motion, tuple(rows), of_meshes, inner, orbit), forces
@@ -312,9 +312,12 @@ def kinds_in_time(
     Kinds beside that of the number vary in stiffness alone. Planets that nothing but the gearbox loads unequally are
     taken as equal, with the mean of all of them.
     """
-    own = {*running.kinds[kind]}
-    count = max(excitations[name].stiffness.shape[1] for name in own if name in excitations)
-    records = [[_record(state, stage, excitations, phases, count, stage.name in own) for stage in row] for row in kinds]
+    stages_of_kind = {*running.kinds[kind]}
+    count = max(excitations[name].stiffness.shape[1] for name in stages_of_kind if name in excitations)
+    records = [
+        [_record(state, stage, excitations, phases, count, stage.name in stages_of_kind) for stage in row]
+        for row in kinds
+    ]
     every = [record for row in records for record in row]
     stiffness, deflection, force = (
         np.concatenate([getattr(record, name) for record in every]) for name in ("stiffness", "deflection", "force")
@@ -331,7 +334,7 @@ def kinds_in_time(
         return excitation, paths, sense
     steps = [phases[row[n].name] - phases[row[0].name] for row in kinds for n in range(len(row))]
     teeth = _teeth(running.angles, np.array(steps), sense)
-    if teeth is None or any(name not in excitations for name in own):
+    if teeth is None or any(name not in excitations for name in stages_of_kind):
         return excitation, paths, sense
     paths = MeshPaths(teeth, running.angles, 0.0, len(running.angles))
     return mean_excitation(excitation, paths, sense), paths, sense

@@ -213,8 +213,8 @@ def sensor_notices(case: GearboxCase) -> Iterator[Finding]:
     """Tell sensors of a table of nodes that are not heard, since no direction says along what (W-UNUSED)."""
     if case.casing is None or case.casing.file is None or (element := casing_at_hand(case)) is None:
         return
-    heard = {sensor.name for sensor, _ in _sensors_of_nodes(case, element)}
-    lost = [node.name for node in element.nodes if node.role == "sensor" and node.name not in heard]
+    with_nodes = {sensor.name for sensor, _ in _sensors_of_nodes(case, element)}
+    lost = [node.name for node in element.nodes if node.role == "sensor" and node.name not in with_nodes]
     if lost:
         text = f"{len(lost)} sensors have no direction along x, y or z, and are not heard: {', '.join(lost[:5])}"
         remedy = "give it in the table, or by [[sensor]] with name and direction"

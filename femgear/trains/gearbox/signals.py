@@ -106,11 +106,11 @@ def gearbox_spectra(results: Results) -> Iterator[Spectrum]:
         return
     for name, order, speed, values in _lines_of_sensors(results, "dynamics"):
         hertz = order * speed[0] / (2.0 * np.pi)
-        known, place = np.unique(np.round(hertz, _DIGITS), return_inverse=True)
-        lines = np.zeros(len(known), complex)
+        frequencies, place = np.unique(np.round(hertz, _DIGITS), return_inverse=True)
+        lines = np.zeros(len(frequencies), complex)
         np.add.at(lines, place.ravel(), values[0])
         kept = np.abs(lines) > 0.0
-        yield Spectrum(f"{name}_lines", "m/s^2", 0.0, lines[kept], known[kept])
+        yield Spectrum(f"{name}_lines", "m/s^2", 0.0, lines[kept], frequencies[kept])
 
 
 def gearbox_order_tables(results: Results) -> Iterator[tuple[str, Sequence[str], Iterator[Sequence[object]]]]:
@@ -124,8 +124,8 @@ def _order_rows(data: xr.Dataset, modes: xr.Dataset | None) -> Iterator[Sequence
     """Rows of `ORDER_HEADER`, the largest line of a sensor first."""
     speed = float(data["speed"].values[0])
     size = np.hypot(data["lines_real"].values[0], data["lines_imag"].values[0])
-    own = ("order", "origin", "harmonic", "side_band")
-    orders, stages, harmonics, bands = (data[name].values for name in own)
+    columns_of_orders = ("order", "origin", "harmonic", "side_band")
+    orders, stages, harmonics, bands = (data[name].values for name in columns_of_orders)
     elastic = np.zeros(0) if modes is None else modes["frequency"].values[modes["frequency"].values > 0.0]
     for number, sensor in enumerate(data["sensor"].values):
         whole = float(data["level"].values[0, number])

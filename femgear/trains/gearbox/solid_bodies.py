@@ -92,11 +92,11 @@ def gearbox_bodies(case: GearboxCase, places: dict[str, np.ndarray]) -> Iterator
         spin, orbit = planets.get(stage.name, (0.0, None))
         for body in bodies:
             runs_around = body.name.startswith(f"{stage.name} planet")
-            own = {"turns": turns.get(body.member, 0.0), "orbit": around.get(body.member)}
-            yield replace(body, stage=number, **({"turns": spin, "orbit": orbit} if runs_around else own))
+            motion = {"turns": turns.get(body.member, 0.0), "orbit": around.get(body.member)}
+            yield replace(body, stage=number, **({"turns": spin, "orbit": orbit} if runs_around else motion))
     for shaft in case.shaft:
-        own = {"turns": turns.get(shaft.name, 0.0), "orbit": around.get(shaft.name)}
-        yield from (replace(part, **own) for part in _of_shaft(shaft))
+        motion = {"turns": turns.get(shaft.name, 0.0), "orbit": around.get(shaft.name)}
+        yield from (replace(part, **motion) for part in _of_shaft(shaft))
     yield from (replace(bearing, orbit=around.get(bearing.member)) for bearing in _of_bearings(case))
 
 

@@ -65,12 +65,12 @@ def solve_box_transient(
     outline, motions, mode = run_outline(case), {}, 0.0
     variants = (ALL_MOTIONS, TORSIONAL) if transient.torsional else (ALL_MOTIONS,)
     for done, variant in enumerate(variants):
-        found = state if variant == ALL_MOTIONS else torsional_state(state, steps=steps)
-        model = gearbox_in_time(found, transient, steps=steps)
+        linearised = state if variant == ALL_MOTIONS else torsional_state(state, steps=steps)
+        model = gearbox_in_time(linearised, transient, steps=steps)
         if variant == ALL_MOTIONS:
             mode = mesh_mode(model, outline.highest_mesh * transient.harmonics)
         tell_share = lambda share, done=done: progress("transient", done + share, len(variants))  # noqa: E731
-        motions[variant] = integrate(model, every=outline.every, told=tell_share)
+        motions[variant] = integrate(model, every=outline.every, tell=tell_share)
     return TransientResult(motions, mode)
 
 

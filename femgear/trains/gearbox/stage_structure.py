@@ -65,9 +65,9 @@ def stage_excitation(
     """
     case, static, steps = contact.case, contact.result, steps or Steps()
     moved = contact.deviations.planet_misalignment, contact.deviations.pin_errors
-    known = {"teeth": case.source, "moved": tuple(np.concatenate([part.ravel() for part in moved]).tolist())}
-    known |= {"friction": friction}
-    if (kept := steps.kept("excitation of a stage", known)) is not None:
+    cache_key = {"teeth": case.source, "moved": tuple(np.concatenate([part.ravel() for part in moved]).tolist())}
+    cache_key |= {"friction": friction}
+    if (kept := steps.kept("excitation of a stage", cache_key)) is not None:
         return kept
     gears = static.planetary_set
     slices = over_width(case, gears, waves=static.waves, steps=steps)
@@ -89,7 +89,7 @@ def stage_excitation(
     stiffness, deflection, force = (state.resampled(name, count) for name in ("stiffness", "deflection", "force"))
     play = np.zeros(len(force))
     transverse = MeshExcitation(stiffness, deflection, force, play, state.periods, friction_on_meshes(state, count))
-    return steps.keep("excitation of a stage", known, transverse.along_normal(cosine))
+    return steps.keep("excitation of a stage", cache_key, transverse.along_normal(cosine))
 
 
 @dataclass(frozen=True)
@@ -199,11 +199,11 @@ def running_stage(
     if ring is not None:
         flexibility = _with_bodies(flexibility, ring.flexibility, len(stage.planets), len(stiffness))
         waves = ring.running(2.0 * damping)
-        own = next(part for part in inner if part.ring.stage is stage)
-        shape[RING] += _ring_waves(own.ring, own.ring.wave, own.coordinates)
+        of_stage = next(part for part in inner if part.ring.stage is stage)
+        shape[RING] += _ring_waves(of_stage.ring, of_stage.ring.wave, of_stage.coordinates)
         if rubbing is not None:
-            for at, sliding in zip((RING, kinds + RING), own.ring.sliding.T, strict=True):
-                of_friction[at] += _ring_waves(own.ring, sliding, own.coordinates)
+            for at, sliding in zip((RING, kinds + RING), of_stage.ring.sliding.T, strict=True):
+                of_friction[at] += _ring_waves(of_stage.ring, sliding, of_stage.coordinates)
             rubbing = RubbingPoints(of_friction, rubbing.approach)
     running = RunningStage(
         2.0 * math.pi * modes.frequency,
@@ -259,8 +259,8 @@ def _ring_waves(ring: ElasticRing, wave: np.ndarray, inner: np.ndarray) -> np.nd
     """
     waves = np.zeros((3, inner.shape[1]), complex)
     for n in (0, 1):
-        found = wave[ring.diameter == n] @ inner[ring.diameter == n]
-        waves[1 + n] += found if n == 0 else 0.5 * found
+        wave_of_body = wave[ring.diameter == n] @ inner[ring.diameter == n]
+        waves[1 + n] += wave_of_body if n == 0 else 0.5 * wave_of_body
         if n:
             # the coordinates are real
             waves[1 - n] += 0.5 * wave[ring.diameter == n].conj() @ inner[ring.diameter == n]
@@ -488,7 +488,7 @@ def _planet(model: GearboxModel, stage: StageModel) -> tuple[np.ndarray, np.ndar
     """Mass, gyroscopic and turning matrices (6, 6) of a planet along its own axes, see `RunningStage`."""
     station = stage.planets[0]
     parts = [inertia for inertia in model.assembly.inertias if inertia.stations == (station,)]
-    mass, gyroscopic = sum(one.mass for one in parts), sum(one.gyroscopic for one in parts)
+    mass, gyroscopic = sum(part.mass for part in parts), sum(part.gyroscopic for part in parts)
     frequency = 2.0 * math.pi * model.flow.mesh_frequency[stage.name]
     turning = np.asarray(block_diag(_TURNING, _TURNING))
     return np.asarray(mass), np.asarray(gyroscopic) / frequency, turning
@@ -530,7 +530,9 @@ def _alike(section: BoxPlanetarySection, angles: Sequence[float]) -> int:
         for count in range(1, len(places) + 1)
         if (sizes.teeth[0] + sizes.teeth[2]) % count == 0
     }
-    return max(count for count, one in turned.items() if np.abs(one - places).min(axis=1).max() < 1e-6)
+    return max(
+        count for count, turned_places in turned.items() if np.abs(turned_places - places).min(axis=1).max() < 1e-6
+    )
 
 
 def reversed_in_time(excitation: MeshExcitation, *, back: bool) -> MeshExcitation:

@@ -141,9 +141,9 @@ def solve_box_runup(
     equal_steps = np.linspace(start, stop, case.runup.count)
     resonances = gearbox_resonances(state, start, stop, steps=steps)
     speeds, missed = run_up_speeds(equal_steps, resonances)
-    found = solve_gearbox_response(state, speeds, steps=steps, progress=progress, stage="runup")
-    longer = longer_excitation(found, steps=steps)
-    return GearboxResponseResult(found, whole=False, unresolved=missed, resonances=resonances, longer=longer)
+    response = solve_gearbox_response(state, speeds, steps=steps, progress=progress, stage="runup")
+    longer = longer_excitation(response, steps=steps)
+    return GearboxResponseResult(response, whole=False, unresolved=missed, resonances=resonances, longer=longer)
 
 
 @one_blas_thread()
@@ -154,10 +154,12 @@ def solve_box_balance(
     rings = tuple(f"ring of {stage.name}" for stage in case.planetary if stage.elastic_ring)
     state, sensors = deflection.of(case).state, gearbox_sensors(case)
     # rings are rigid here: sensors on them hear nothing that could be told
-    heard = [number for number, sensor in enumerate(sensors) if not sensor.ring]
+    on_casing = [number for number, sensor in enumerate(sensors) if not sensor.ring]
     solved = solve_balance(state, steps=steps, progress=progress)
-    stages = tuple(replace(stage, acceleration=stage.acceleration[heard]) for stage in solved)
-    return GearboxBalanceResult(stages, rings, tuple(sensors[number].name for number in heard), case.balance.together)
+    stages = tuple(replace(stage, acceleration=stage.acceleration[on_casing]) for stage in solved)
+    return GearboxBalanceResult(
+        stages, rings, tuple(sensors[number].name for number in on_casing), case.balance.together
+    )
 
 
 def _no_balance(case: GearboxCase) -> str:

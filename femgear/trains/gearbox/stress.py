@@ -95,11 +95,11 @@ class GearboxStressResult(StageResult):
             "mesh": (("mesh",), [name for stage in self.stages for name in stage.meshes], "1", "gear mesh"),
             "gear": (("gear",), ["first", "second"], "1", "gear of the mesh"),
         }
-        told = [
+        reasons = [
             {"name": stage.name, "key": stage.key, "meshes": stage.inside, "attributes": dict(stage.attributes)}
             for stage in self.stages
         ]
-        attributes = {"title": "root stresses and contact pressures of the stages", "stages": json.dumps(told)}
+        attributes = {"title": "root stresses and contact pressures of the stages", "stages": json.dumps(reasons)}
         return Contents(variables, coords, attributes)
 
 
@@ -114,9 +114,9 @@ def solve_box_stress(case: GearboxCase, deflection: Any, *, progress: Progress =
     progress : callable
         Called with ("stress", done, total).
     """
-    found: Deflection = deflection.of(case).state
-    stages = [stage for stage in found.model.stages if stage.name in found.contacts and stresses_wanted(stage.section)]
-    names = found.model.assembly.contacts
+    state: Deflection = deflection.of(case).state
+    stages = [stage for stage in state.model.stages if stage.name in state.contacts and stresses_wanted(stage.section)]
+    names = state.model.assembly.contacts
     solved, of_contact = list[StageStress](), dict[int, StageStress]()
     for number, stage in enumerate(stages):
         progress("stress", number, len(stages))
@@ -124,9 +124,9 @@ def solve_box_stress(case: GearboxCase, deflection: Any, *, progress: Progress =
         key = f"{kind}[{getattr(case, kind).index(stage.section)}].teeth"
         meshes = tuple(names[mesh].name for mesh in stage.meshes)
         # equal branches of planets have one contact, and one state of stress
-        contact = id(found.contacts[stage.name])
+        contact = id(state.contacts[stage.name])
         if contact not in of_contact:
-            of_contact[contact] = _stage_stress(found, stage.name, key, meshes)
+            of_contact[contact] = _stage_stress(state, stage.name, key, meshes)
         solved.append(replace(of_contact[contact], name=stage.name, key=key, meshes=meshes))
     return GearboxStressResult(tuple(solved))
 
@@ -159,8 +159,11 @@ def _stage_stress(state: Deflection, name: str, key: str, meshes: tuple[str, ...
         key,
         meshes,
         tuple(map(str, data["mesh"].values)),
-        {name: one.values for name, one in kept.items()},
-        {name: (one.attrs.get("units", "1"), one.attrs.get("long_name", "")) for name, one in kept.items()},
+        {name: variable.values for name, variable in kept.items()},
+        {
+            name: (variable.attrs.get("units", "1"), variable.attrs.get("long_name", ""))
+            for name, variable in kept.items()
+        },
         {name: _plain(data.attrs[name]) for name in _ATTRIBUTES if name in data.attrs},
     )
 

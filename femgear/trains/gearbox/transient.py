@@ -114,9 +114,9 @@ def gearbox_in_time(
     """
     model = state.model
     excitations = all_excitations(state, steps=steps)
-    known: dict[str, Any] = {"harmonics": transient.harmonics, "separates": transient.contact_loss}
-    known["mean_damping"] = mean_damping
-    box = nonlinear_gearbox(state, excitations, **known, back_flanks=transient.back_flanks, turning=transient.turning)
+    options: dict[str, Any] = {"harmonics": transient.harmonics, "separates": transient.contact_loss}
+    options["mean_damping"] = mean_damping
+    box = nonlinear_gearbox(state, excitations, **options, back_flanks=transient.back_flanks, turning=transient.turning)
     shaft = reference_shaft(model)
     system = box.problem.system
     made = GearboxInTime(box, _without_contacts(box), shaft)
@@ -177,7 +177,7 @@ class GearboxMotion:
     shafts: tuple[str, ...]
 
 
-def integrate(model: GearboxInTime, *, every: int = 1, lowpass: bool = True, told=lambda share: None) -> GearboxMotion:
+def integrate(model: GearboxInTime, *, every: int = 1, lowpass: bool = True, tell=lambda share: None) -> GearboxMotion:
     """Integrate the motion of a gearbox as its case asks for it; one record of ``every`` so many steps.
 
     ConvergenceError: the motion outgrows the numbers, or all sense (E-DIVERGED).
@@ -196,7 +196,7 @@ def integrate(model: GearboxInTime, *, every: int = 1, lowpass: bool = True, tol
             speed=model.speed,
             start=transient.start,
             outputs=np.array([model.box.motion[6 * model.box.deflection.model.first[name] + 5] for name in shafts]),
-            records=Records(every, lowpass=lowpass, told=told),
+            records=Records(every, lowpass=lowpass, told=tell),
             contact_loss=transient.contact_loss,
         )
     except (CaseError, ConvergenceError) as error:

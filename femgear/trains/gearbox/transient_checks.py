@@ -118,9 +118,9 @@ def run_outline(case: GearboxCase) -> RunOutline:
     given |= {torque.load: torque for torque in transient.torque}
     torques = torque_histories(list(given.items()), ports) if speed else ()
     ratios, inertia = [ports[torque.body] for torque in torques], turning_inertia(model, shaft)
-    known = {"duration": transient.duration, "speed": speed}
+    outline = {"duration": transient.duration, "speed": speed}
     speeds, late = (
-        reached_speeds(torques, ratios, inertia, **known, start=start) for start in (0.0, transient.settled)
+        reached_speeds(torques, ratios, inertia, **outline, start=start) for start in (0.0, transient.settled)
     )
     orders = {name: 2.0 * math.pi * hertz / abs(speed) for name, hertz in flow.mesh_frequency.items()} if speed else {}
     mesh = max(orders, key=lambda name: orders[name], default="")
@@ -140,7 +140,7 @@ def turning_inertia(model: GearboxModel, shaft: str) -> float:
         for coupling in case.coupling
         if not coupling.transmits and coupling.torsion and math.isfinite(coupling.torsion)
     )
-    if held or any(CASING in one.between for one in braked) or not flow.speed[shaft]:
+    if held or any(CASING in brake.between for brake in braked) or not flow.speed[shaft]:
         return math.inf
     motion = np.zeros((len(model.assembly.names), 6))
     for section in case.shaft:

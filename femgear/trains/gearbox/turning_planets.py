@@ -80,7 +80,7 @@ class TurningPlanets:
 
 def turning_planets(model: GearboxModel, stages: Sequence[StageModel]) -> dict[str, TurningPlanets]:
     """Find the planets that go round of stages, by the names of these; a pair has those of its carrier."""
-    found = {stage.name: planets for stage in stages if (planets := planets_of_stage(model, stage)) is not None}
+    of_stages = {stage.name: planets for stage in stages if (planets := planets_of_stage(model, stage)) is not None}
     meshes = {stage.name: stage.meshes[0] for stage in model.stages}
     for running in running_sets(model.case):
         first = running.branches[0]
@@ -105,8 +105,8 @@ def turning_planets(model: GearboxModel, stages: Sequence[StageModel]) -> dict[s
             running,
         )
         names = {name for kind in running.kinds for name in kind}
-        found |= {stage.name: around for stage in stages if stage.name in names}
-    return found
+        of_stages |= {stage.name: around for stage in stages if stage.name in names}
+    return of_stages
 
 
 def planets_of_stage(model: GearboxModel, stage: StageModel) -> TurningPlanets | None:
@@ -182,14 +182,14 @@ def turning_terms(
     displacement = np.zeros_like(velocity)
     for planets in turning:
         Z, speed = wave_generator(planets, assembly.count), planets.speed
-        own = replace(
+        planets_alone = replace(
             assembly,
             inertias=tuple(inertia for inertia in assembly.inertias if inertia.stations[0] in planets.stations),
         )
         mass = assembly.mass
-        displacement += speed**2 * Z @ own.mass @ Z + centrifugal_pull(assembly, planets, own.mass)
+        displacement += speed**2 * Z @ planets_alone.mass @ Z + centrifugal_pull(assembly, planets, planets_alone.mass)
         if gyroscopic:
-            turned = speed * own.gyroscopic @ Z
+            turned = speed * planets_alone.gyroscopic @ Z
             displacement += 0.5 * (turned + turned.T)
         velocity = velocity + speed * (mass @ Z + Z @ mass)
     return velocity, displacement
