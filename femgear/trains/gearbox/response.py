@@ -145,7 +145,7 @@ class GearboxResponse:
 
         R.m.s. values, the latter by all stages; zero of a stage itself.
         """
-        found = np.zeros((len(self.speed), len(self.stages), len(self.stages)))
+        shares = np.zeros((len(self.speed), len(self.stages), len(self.stages)))
         every = self.dynamic_forces
         for a, excited in enumerate(self.stages):
             count = len(excited.meshes) // len(excited.spread)
@@ -154,8 +154,8 @@ class GearboxResponse:
                     continue
                 moved = other.approach[:, list(excited.meshes)].reshape(len(self.speed), -1, count).max(axis=2)
                 whole = np.maximum(every[:, a, : len(excited.spread)], np.finfo(float).tiny)
-                found[:, a, b] = (excited.spread * moved / whole).max(axis=1)
-        return found
+                shares[:, a, b] = (excited.spread * moved / whole).max(axis=1)
+        return shares
 
     @property
     def dynamic_forces(self) -> np.ndarray:
@@ -164,12 +164,12 @@ class GearboxResponse:
         That of the planet with the largest one; NaN where a pair has no second mesh.
         """
         every = np.sqrt((self.mesh_forces**2).sum(axis=2))
-        found = np.full((len(self.speed), len(self.stages), 2), np.nan)
+        forces = np.full((len(self.speed), len(self.stages), 2), np.nan)
         for number, stage in enumerate(self.stages):
             kinds = len(stage.spread)
-            own = every[:, list(stage.meshes)].reshape(len(every), kinds, -1)
-            found[:, number, :kinds] = own.max(axis=2)
-        return found
+            of_stage = every[:, list(stage.meshes)].reshape(len(every), kinds, -1)
+            forces[:, number, :kinds] = of_stage.max(axis=2)
+        return forces
 
     @property
     def mesh_forces(self) -> np.ndarray:
@@ -177,23 +177,23 @@ class GearboxResponse:
         model = self.deflection.model
         loss = abs(1.0 + 2j * model.case.modes.damping_ratio)
         stiffness = loss * np.array([contact.stiffness.sum() for contact in model.assembly.contacts])
-        found = np.stack([stage.approach * stiffness for stage in self.stages], axis=2)
+        forces = np.stack([stage.approach * stiffness for stage in self.stages], axis=2)
         for number, stage in enumerate(self.stages):
-            own = np.repeat(stage.dynamic_force, len(stage.meshes) // stage.dynamic_force.shape[1], axis=1)
-            found[:, list(stage.meshes), number] = own
-        return found
+            of_stage = np.repeat(stage.dynamic_force, len(stage.meshes) // stage.dynamic_force.shape[1], axis=1)
+            forces[:, list(stage.meshes), number] = of_stage
+        return forces
 
 
-def output_rows(found: Deflection) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def output_rows(state: Deflection) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Make rows of all motions for sensors (s, 6n), bearings (3b, 6n) and feet (3f, 6n).
 
     Those of sensors give displacements [1, m]. Those of bearings and feet give, by stiffness and damping, forces on the
     shaft and on the casing along x, y, z [N/m, N]; NaN where they are rigid.
     """
-    model = found.model
+    model = state.model
     assembly, loss = model.assembly, 2.0 * model.case.modes.damping_ratio
     bearings = np.zeros((len(model.bearings), 3, assembly.count), complex)
-    for row, springs, tangent in zip(bearings, model.bearings, found.bearing_stiffness, strict=True):
+    for row, springs, tangent in zip(bearings, model.bearings, state.bearing_stiffness, strict=True):
         finite = np.where(np.isfinite(tangent[:3]), tangent[:3], 0.0)
         row[:] = -(1.0 + 1j * loss) * finite @ spread_rows(springs, assembly)
         row[np.isinf(tangent[:3]).any(axis=1)] = np.nan
@@ -209,7 +209,7 @@ def output_rows(found: Deflection) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 
 def solve_gearbox_response(
-    found: Deflection,
+    state: Deflection,
     speed: Sequence[float] | np.ndarray,
     *,
     steps: Steps | None = None,
@@ -222,7 +222,7 @@ def solve_gearbox_response(
 
     Parameters
     ----------
-    found : Deflection
+    state : Deflection
         Loaded state.
     speed : (v,) sequence of float
         Of the reference shaft [rad/s], positive.
@@ -242,26 +242,26 @@ def solve_gearbox_response(
     FemgearError
         A mesh that opens (E-CONTACT-OPEN), equations that are nearly singular (E-RESONANCE).
     """
-    model, steps = found.model, steps or Steps()
+    model, steps = state.model, steps or Steps()
     rings = elastic_rings(model, steps=steps, friction=friction)
     case, reference = model.case, reference_shaft(model)
     nominal, speeds = abs(model.flow.speed[reference]), np.asarray(speed, float)
     up_to = case.dynamics.up_to
-    rows, sensors = np.vstack(output_rows(found)), gearbox_sensors(case)
-    paths = casing_paths(found) if by_path else None
-    lines, staged, phases = list[StageLines](), exciting_stages(found), pair_phases(case, model.flow)
-    excitations = {one.name: excitation_of(found, one, rings, steps=steps, friction=friction) for one in staged}
-    parts = [*_exciting_parts(found, staged, excitations, phases, rings)]
+    rows, sensors = np.vstack(output_rows(state)), gearbox_sensors(case)
+    paths = casing_paths(state) if by_path else None
+    lines, staged, phases = list[StageLines](), exciting_stages(state), pair_phases(case, model.flow)
+    excitations = {stage.name: excitation_of(state, stage, rings, steps=steps, friction=friction) for stage in staged}
+    parts = [*_exciting_parts(state, staged, excitations, phases, rings)]
     for done, together in enumerate(parts, start=1):
         outputs = [_outputs(model, part, rows, len(sensors)) for part in together]
-        lines += _stage_lines(found, together, outputs, speeds / nominal, paths)
+        lines += _stage_lines(state, together, outputs, speeds / nominal, paths)
         progress(stage, done, len(parts))
-    missing = tuple(one.name for one in model.stages if one not in staged)
+    missing = tuple(stage.name for stage in model.stages if stage not in staged)
     # what runs around has the phases of its teeth
     alone = {part.name: phases.get(part.name, 0.0) for (part, *_) in parts if part.forces is None}
     lines = _in_phase(lines, alone)
     names = () if paths is None else paths.names
-    return GearboxResponse(found, reference, speeds, tuple(lines), missing, up_to, names)
+    return GearboxResponse(state, reference, speeds, tuple(lines), missing, up_to, names)
 
 
 def _outputs(model: GearboxModel, part: _ExcitingPart, rows: np.ndarray, sensors: int) -> np.ndarray:
@@ -329,7 +329,7 @@ class _ExcitingPart:
 
 
 def _exciting_parts(
-    found: Deflection,
+    state: Deflection,
     staged: Sequence[StageModel],
     excitations: Mapping[str, MeshExcitation],
     phases: Mapping[str, float],
@@ -337,19 +337,19 @@ def _exciting_parts(
 ) -> Iterator[list[_ExcitingPart]]:
     """Take what excites a gearbox out of it; parts that differ in their excitation alone stand together."""
     stages, done = {stage.name: stage for stage in staged}, set[str]()
-    for running in running_sets(found.model.case):
+    for running in running_sets(state.model.case):
         left = [kind for kind, names in enumerate(running.kinds) if not stages.keys().isdisjoint(names)]
         while left:
-            together = kinds_together(found.model, running, left[0])
+            together = kinds_together(state.model, running, left[0])
             kinds = [kind for kind in left if kind in together]
             left = [kind for kind in left if kind not in together]
-            for group in branch_kinds(found, running, kinds, excitations, phases, rings):
+            for group in branch_kinds(state, running, kinds, excitations, phases, rings):
                 names = [running.kinds[together[forces.own.start]] for _, forces in group]
-                yield [_kind_part(found.model, own, *made) for own, made in zip(names, group, strict=True)]
+                yield [_kind_part(state.model, of_kind, *made) for of_kind, made in zip(names, group, strict=True)]
             done |= {name for kind in kinds for name in running.kinds[kind]}
     for stage in staged:
         if stage.name not in done:
-            structured = running_stage(found, stage, excitations[stage.name], rings)
+            structured = running_stage(state, stage, excitations[stage.name], rings)
             yield [_ExcitingPart(stage.name, (stage,), structured)]
 
 
@@ -357,22 +357,22 @@ def _kind_part(
     model: GearboxModel, names: Collection[str], structured: StructuredStage, forces: BranchForces
 ) -> _ExcitingPart:
     """One kind of meshes, of these names, of planets that are shafts."""
-    own = tuple(stage for stage in model.stages if stage.name in names)
-    return _ExcitingPart(merged_names([*names]), own, structured, forces)
+    members = tuple(stage for stage in model.stages if stage.name in names)
+    return _ExcitingPart(merged_names([*names]), members, structured, forces)
 
 
 def mesh_rows(model: GearboxModel, meshes: Collection[int]) -> np.ndarray:
     """Rows (M, 6n) of the approach of the flanks of all meshes in the middle of their slices; zero of these ones."""
     assembly = model.assembly
-    found = np.zeros((len(assembly.contacts), assembly.count))
+    rows = np.zeros((len(assembly.contacts), assembly.count))
     for number, part in enumerate(assembly.slices):
         if number not in meshes:
-            found[number] = assembly.columns[:, part].mean(axis=1)
-    return found
+            rows[number] = assembly.columns[:, part].mean(axis=1)
+    return rows
 
 
 def _stage_lines(
-    found: Deflection,
+    state: Deflection,
     parts: Sequence[_ExcitingPart],
     outputs: Sequence[np.ndarray],
     factors: np.ndarray,
@@ -382,7 +382,7 @@ def _stage_lines(
 
     Of outputs (k, m) of each per unit of a mode of the structure, the last ones approaches of meshes.
     """
-    model, first = found.model, parts[0]
+    model, first = state.model, parts[0]
     stage, dynamics = first.stages[0], model.case.dynamics
     mesh = 2.0 * math.pi * model.flow.mesh_frequency[stage.name]
     turns = first.structured.orbit is not None
@@ -393,12 +393,12 @@ def _stage_lines(
     stages, longest = [part.structured.running for part in parts], int(counts.argmax())
 
     def solve(i: int) -> list[RunningResponse]:
-        known = {"harmonics": (int(counts[i]),) * 2, "side_bands": bands, "tolerance": dynamics.tolerance}
-        return solve_excitations(stages, mesh * factors[i], carrier * factors[i], **known)
+        options = {"harmonics": (int(counts[i]),) * 2, "side_bands": bands, "tolerance": dynamics.tolerance}
+        return solve_excitations(stages, mesh * factors[i], carrier * factors[i], **options)
 
     most_lines = solve(longest)
     of_parts = [
-        _PartLines(found, part, rows, len(factors), response, paths)
+        _PartLines(state, part, rows, len(factors), response, paths)
         for part, rows, response in zip(parts, outputs, most_lines, strict=True)
     ]
 
@@ -433,15 +433,15 @@ class _PartLines:
 
     def __init__(
         self,
-        found: Deflection,
+        state: Deflection,
         part: _ExcitingPart,
         outputs: np.ndarray,
         speeds: int,
         longest: RunningResponse,
         paths: CasingPaths | None,
     ):
-        self.found, self.part, self.outputs, self.casing_paths = found, part, outputs, paths
-        running, sensors = part.structured.running, gearbox_sensors(found.model.case)
+        self.found, self.part, self.outputs, self.casing_paths = state, part, outputs, paths
+        running, sensors = part.structured.running, gearbox_sensors(state.model.case)
         self.on_own_ring = [number for number, sensor in enumerate(sensors) if sensor.ring == part.name]
         on_ring = [sensors[i] for i in self.on_own_ring]
         self.places = np.array([sensor.angle for sensor in on_ring]), np.array([sensor.on_ring for sensor in on_ring])
@@ -450,7 +450,7 @@ class _PartLines:
             longest, running.paths.symmetry, at_ring, on_pins=part.forces is not None
         )
         self.periods = longest.orders.periods
-        self.measured = len(outputs) - len(found.model.assembly.contacts)
+        self.measured = len(outputs) - len(state.model.assembly.contacts)
         precision = np.complex64 if speeds > _MANY else np.complex128
         self.motion = np.zeros((speeds, self.measured, len(self.line)), precision)
         count = len(running.paths.planet_angles)
@@ -521,7 +521,7 @@ def _on_pins(
 
     ``lines`` are their numbers and places of the side bands of the structure.
     """
-    found, sensors = np.zeros((len(lines[0]), outputs), complex), len(gearbox_sensors(model.case))
+    lines_of_pins, sensors = np.zeros((len(lines[0]), outputs), complex), len(gearbox_sensors(model.case))
     places = response.orders.place(response.band[lines[1]])
     there = places < len(response.orders.bands)
     for bearing, (branch, points, ways) in forces.pins.items():
@@ -531,8 +531,8 @@ def _on_pins(
         N = response.orders.paths.symmetry
         pushed = pushed * np.exp(2j * math.pi * (response.orders.sense * turn * (whole % N) % N) / N)[..., None]
         at = sensors + 3 * bearing + np.arange(3)
-        found[np.ix_(there, at)] = 2.0 * pushed[lines[0][there], places[there]]
-    return found
+        lines_of_pins[np.ix_(there, at)] = 2.0 * pushed[lines[0][there], places[there]]
+    return lines_of_pins
 
 
 def _add_branch_meshes(
@@ -560,12 +560,12 @@ def _line_numbers(
     return line, response.band[at], at
 
 
-def _extremes(response: RunningResponse, own: slice) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def _extremes(response: RunningResponse, rows: slice) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Smallest and largest force (kinds,) of the leading meshes of own kinds beyond their mean, and its r.m.s. [N].
 
     Over a mesh period and a turn of the carrier, which are seldom in a small ratio.
     """
-    force = response.force[:, : response.kinds][:, own]
+    force = response.force[:, : response.kinds][:, rows]
     leaders, kinds, lines, bands = force.shape
     points = max(_INSTANTS, 4 * lines)
     spectrum = np.zeros((leaders, kinds, points, bands), complex)
@@ -594,8 +594,8 @@ def level(response: GearboxResponse, lines: Mapping[str, np.ndarray]) -> np.ndar
     speeds = len(response.speed)
     # some speeds after the others: lines of all outputs in order would be twice what the response itself fills
     parts = [
-        0.5 * (np.abs(by_order(response, {name: values[some] for name, values in lines.items()})) ** 2).sum(axis=2)
-        for some in np.array_split(np.arange(speeds), math.ceil(speeds / _TOGETHER))
+        0.5 * (np.abs(by_order(response, {name: values[block] for name, values in lines.items()})) ** 2).sum(axis=2)
+        for block in np.array_split(np.arange(speeds), math.ceil(speeds / _TOGETHER))
     ]
     return np.sqrt(np.concatenate(parts))
 

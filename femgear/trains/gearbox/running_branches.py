@@ -170,7 +170,7 @@ def kinds_together(model: GearboxModel, running: RunningSet, kind: int) -> list[
 
 
 def branch_kinds(
-    found: Deflection,
+    state: Deflection,
     running: RunningSet,
     kinds: Sequence[int],
     excitations: Mapping[str, MeshExcitation],
@@ -182,19 +182,19 @@ def branch_kinds(
     Parameters are those of `branch_stage`, ``kinds`` the numbers of the kinds. Those that differ in their excitation
     alone stand together, see `femgear.housing.two_way.running_planets.solve_excitations`.
     """
-    structured, forces = branch_stage(found, running, kinds[0], excitations, phases, rings)
-    together, stages = kinds_together(found.model, running, kinds[0]), {s.name: s for s in found.model.stages}
+    structured, forces = branch_stage(state, running, kinds[0], excitations, phases, rings)
+    together, stages = kinds_together(state.model, running, kinds[0]), {s.name: s for s in state.model.stages}
     meshes = [[stages[name] for name in running.kinds[n]] for n in together]
     first, made = structured.running, [[(structured, forces)]]
     for kind in kinds[1:]:
-        excitation, paths, sense = kinds_in_time(found, running, meshes, kind, excitations, phases)
-        mean, own = excitation.stiffness.mean(axis=1).reshape(len(together), -1).mean(axis=1), together.index(kind)
+        excitation, paths, sense = kinds_in_time(state, running, meshes, kind, excitations, phases)
+        mean, of_kind = excitation.stiffness.mean(axis=1).reshape(len(together), -1).mean(axis=1), together.index(kind)
         alike = np.array_equal(mean, first.stiffness[: len(together)]) and paths == first.paths
         if alike and (excitation.source is None) == (first.rubbing is None):
             stage = replace(first, excitation=excitation, sense=sense)
-            made[0].append((replace(structured, running=stage), replace(forces, own=slice(own, own + 1))))
+            made[0].append((replace(structured, running=stage), replace(forces, own=slice(of_kind, of_kind + 1))))
         else:
-            made.append([branch_stage(found, running, kind, excitations, phases, rings)])
+            made.append([branch_stage(state, running, kind, excitations, phases, rings)])
     return made
 
 
