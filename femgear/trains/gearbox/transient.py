@@ -103,20 +103,20 @@ class GearboxInTime:
 
 
 def gearbox_in_time(
-    state: Deflection, transient: TransientSection, *, steps: Steps | None = None, mean_damping: bool = True
+    found: Deflection, transient: TransientSection, *, steps: Steps | None = None, mean_damping: bool = True
 ) -> GearboxInTime:
-    """Make a gearbox ready for integration in time about its loaded state.
+    """Make a gearbox ready for integration in time about its loaded found.
 
     ``mean_damping`` is that of `femgear.trains.gearbox.nonlinear.nonlinear_gearbox`.
 
     CaseError: planets that are not equally spaced on a carrier that turns (E-TURNING), several motions that nothing
     holds (E-MECHANISM), a stiffness that is not positive (E-STIFFNESS).
     """
-    model = state.model
-    excitations = all_excitations(state, steps=steps)
+    model = found.model
+    excitations = all_excitations(found, steps=steps)
     options: dict[str, Any] = {"harmonics": transient.harmonics, "separates": transient.contact_loss}
     options["mean_damping"] = mean_damping
-    box = nonlinear_gearbox(state, excitations, **options, back_flanks=transient.back_flanks, turning=transient.turning)
+    box = nonlinear_gearbox(found, excitations, **options, back_flanks=transient.back_flanks, turning=transient.turning)
     shaft = reference_shaft(model)
     system = box.problem.system
     made = GearboxInTime(box, _without_contacts(box), shaft)
@@ -177,7 +177,7 @@ class GearboxMotion:
     shafts: tuple[str, ...]
 
 
-def integrate(model: GearboxInTime, *, every: int = 1, lowpass: bool = True, tell=lambda share: None) -> GearboxMotion:
+def integrate(model: GearboxInTime, *, every: int = 1, lowpass: bool = True, told=lambda share: None) -> GearboxMotion:
     """Integrate the motion of a gearbox as its case asks for it; one record of ``every`` so many steps.
 
     ConvergenceError: the motion outgrows the numbers, or all sense (E-DIVERGED).
@@ -196,7 +196,7 @@ def integrate(model: GearboxInTime, *, every: int = 1, lowpass: bool = True, tel
             speed=model.speed,
             start=transient.start,
             outputs=np.array([model.box.motion[6 * model.box.deflection.model.first[name] + 5] for name in shafts]),
-            records=Records(every, lowpass=lowpass, told=tell),
+            records=Records(every, lowpass=lowpass, told=told),
             contact_loss=transient.contact_loss,
         )
     except (CaseError, ConvergenceError) as error:
