@@ -29,6 +29,8 @@ _RIGID_TOLERANCE = 1e-6
 _RIGID_ROUNDING = 1e-9
 # Eigenvalue relative to the largest one below which a motion has no stiffness.
 _RIGID = 1e-12
+# The same over the softest coordinate, where modes beside so many others are told apart.
+_SOFT, _BESIDE = 1e-9, 8
 # Pole relative to the largest one that counts as zero or as real.
 _ZERO = 1e-11
 # Condition of the eigenvectors above which the poles are taken for defective.
@@ -140,7 +142,7 @@ def undamped_modes(
             key="gyroscopic",
             remedy="leave them out of the system that is reduced to modes",
         )
-    values, shape, rigid = _eigen(system.M, stiffness, count, max_frequency)
+    values, shape, rigid = _eigen(system, stiffness, count, max_frequency)
     if np.any(rigid):
         shape[:, rigid] = _refined_rigid(system.M, stiffness, shape[:, rigid])
     springs = spring_directions(system, mesh_stiffness)
@@ -428,8 +430,9 @@ def _spring_share(system: MechanicalSystem, mesh_stiffness) -> np.ndarray:
     return np.linalg.inv(np.eye(len(flexibility)) + flexibility * np.asarray(mesh_stiffness, float))
 
 
-def _eigen(mass, stiffness, count, max_frequency):
+def _eigen(system: MechanicalSystem, stiffness, count, max_frequency):
     """Eigenvalues and mass-normalised shapes that are asked for, and which of them are rigid."""
+    mass = system.M
     if count is not None and max_frequency is not None:
         raise CaseError("give the number of modes or the highest frequency, not both", code="E-MODES")
     n = len(mass)
@@ -465,6 +468,10 @@ def _eigen(mass, stiffness, count, max_frequency):
             kept += 1
         values, vectors = values[:kept], vectors[:, :kept]
     rigid = _rigid(values, scale, n)
+    if np.any(rigid) and _strains(
+        system, scipy.linalg.solve_triangular(factor, vectors[:, rigid], lower=True, trans=1)
+    ):
+        values, vectors, rigid = _told_apart(factor, stiffness, values, vectors, rigid)
     vectors = fixed_basis(np.where(rigid, 0.0, values), vectors)
     return values, scipy.linalg.solve_triangular(factor, vectors, lower=True, trans=1), rigid
 
@@ -481,6 +488,32 @@ def _rigid(values: np.ndarray, scale: float, n: int) -> np.ndarray:
     return np.abs(values) <= threshold
 
 
+def _told_apart(factor, stiffness, values, vectors, rigid) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Tell soft modes from rigid ones where rounding of the largest eigenvalue hides both, as light parts make it.
+
+    The lowest modes are combined anew for ``(K + s M)^-1``, whose largest eigenvalues ``1/(omega^2 + s)`` are theirs
+    (B. N. Parlett, The Symmetric Eigenvalue Problem, 1998, section 4.4); coordinates of one scale keep ``K + s M`` from
+    drowning soft ones. ``factor`` is that of M, values and vectors are those of the standard problem.
+    """
+    few, mass = min(len(values), 2 * np.count_nonzero(rigid) + _BESIDE), factor @ factor.T
+    shift = _softest(mass, stiffness)
+    shifted = stiffness + shift * mass
+    size = np.sqrt(np.abs(np.diag(shifted)))
+    try:
+        held = scipy.linalg.cho_factor(shifted / np.outer(size, size), lower=True)
+    except scipy.linalg.LinAlgError:
+        return values, vectors, rigid
+    carried = factor @ vectors[:, :few] / size[:, None]
+    inverse, mixed = scipy.linalg.eigh(carried.T @ scipy.linalg.cho_solve(held, carried))
+    low = 1.0 / inverse[::-1] - shift
+    vectors = np.hstack([vectors[:, :few] @ mixed[:, ::-1], vectors[:, few:]])
+    return (
+        np.append(low, values[few:]),
+        vectors,
+        np.arange(len(values)) < np.count_nonzero(np.abs(low) <= _SOFT * shift),
+    )
+
+
 def _refined_rigid(mass, stiffness, shape) -> np.ndarray:
     """Rigid modes cleaned of elastic parts, mass-orthonormal: twice ``x - (K + a M x x^T M)^-1 K x``."""
     for _ in range(2):
@@ -493,10 +526,7 @@ def _refined_rigid(mass, stiffness, shape) -> np.ndarray:
 def _held(mass, stiffness, rigid):
     """Cholesky factor of ``K + a M R R^T M``: the elastic part as it is, rigid motions held by a spring a."""
     carried = mass @ rigid
-    # as soft as the softest coordinate: a stiff spring would drown soft couplings in its rounding
-    ratio_of_diagonals = np.diag(stiffness) / np.diag(mass)
-    weight = ratio_of_diagonals[ratio_of_diagonals > 0.0].min(initial=np.inf)
-    weight = weight if np.isfinite(weight) else 1.0
+    weight = _softest(mass, stiffness)
     try:
         return scipy.linalg.cho_factor(stiffness + weight * (carried @ carried.T), lower=True)
     except scipy.linalg.LinAlgError:
@@ -505,6 +535,18 @@ def _held(mass, stiffness, rigid):
             code="E-STIFFNESS",
             remedy="bring the stiffnesses closer together",
         ) from None
+
+
+def _softest(mass, stiffness) -> float:
+    """Ratio of stiffness to mass of the softest coordinate: of a stiff one rounding would drown soft couplings."""
+    ratio_of_diagonals = np.diag(stiffness) / np.diag(mass)
+    weight = ratio_of_diagonals[ratio_of_diagonals > 0.0].min(initial=np.inf)
+    return weight if np.isfinite(weight) else 1.0
+
+
+def _strains(system: MechanicalSystem, rigid: np.ndarray) -> bool:
+    """Whether modes (n, r) strain an element beyond rounding."""
+    return bool(np.any(np.abs(system.W.T @ rigid) > _allowed(system.W, rigid)))
 
 
 def _check_rigid(system: MechanicalSystem, rigid: np.ndarray) -> None:

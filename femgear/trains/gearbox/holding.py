@@ -314,23 +314,26 @@ def without_balance(case: GearboxCase, owner: str, way: int, left: float) -> Con
     ``owner`` moves the farthest, along or about the ``way`` of `_MOTIONS`; ``left`` is the force out of balance [N].
     """
     bearings = {i: bearing for i, bearing in enumerate(case.bearing) if bearing.shaft == owner and bearing.nonlinear}
+    shafts = [shaft.name for shaft in case.shaft]
     key, value = "bearing", None
+    limit = "bearings that carry what loads and weight put on the shaft, in its sense"
+    remedy = "a smaller clearance or a preload of the bearings of this shaft, or a load that presses them"
     if bearings:
         i = max(bearings, key=lambda number: bearings[number].clearance)
         entry = "clearance" if way != 2 and bearings[i].kind else "axial_sense" if bearings[i].axial_sense else "kind"
         key, value = f"bearing[{i}].{entry}", getattr(bearings[i], entry)
         value = LENGTH.show(value) if entry == "clearance" else value
-    remedies = (
-        "give a bearing that takes the thrust",
-        "a smaller clearance or a preload of the bearings of this shaft, or a load that presses them",
-    )
+    elif way != 2 and owner in shafts:
+        key = f"shaft[{shafts.index(owner)}]"
+        limit = "shafts, bearings and teeth that give way little under the load"
+        remedy = "stiffer parts or bearings of this shaft, or less torque"
     return ConvergenceError(
         f"the loads of the gearbox find no balance: {FORCE.show(left)} are left, and {owner} moves the farthest, "
         f"{_MOTIONS[way]}",
         code="E-CONVERGENCE",
         key=key,
         value=value,
-        limit="bearings that carry what loads and weight put on the shaft, in its sense",
-        remedy=remedies[0] if way == 2 else remedies[1],
+        limit=limit,
+        remedy="give a bearing that takes the thrust" if way == 2 else remedy,
         file=case.location(key),
     )

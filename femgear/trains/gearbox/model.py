@@ -21,6 +21,7 @@ from femgear.case.sections import gear_material
 from femgear.errors import CaseError
 from femgear.fe.beam import BeamShaft, ShaftPart, beam_shaft, body_matrices, growth_load, rigid_link
 from femgear.gears.iso6336_stiffness import pair_mesh_stiffness
+from femgear.report.tables import merged_names
 from femgear.system.assembly import GROUND, Assembly, Beam, Contact, Inertia, StationSprings, joint, mesh_normal
 from femgear.trains.gearbox.carrier import pin_axes, pin_compliance, planet_springs
 from femgear.trains.gearbox.case_file import (
@@ -685,6 +686,18 @@ def member_of_stations(model: GearboxModel) -> list[str]:
         for pin in stage.elastic_carrier.stations[1:] if stage.elastic_carrier else ():
             owner[pin] = f"carrier of {stage.name}"
     return owner
+
+
+def seats_of_stations(model: GearboxModel) -> list[str]:
+    """Name the meshes and bearings at every station; empty where there are none."""
+    seats = [list[str]() for _ in model.assembly.names]
+    listed = [*((contact.name, contact.stations) for contact in model.assembly.contacts)]
+    listed += [(springs.name, springs.stations) for springs in model.bearings]
+    for name, stations in listed:
+        for station in stations:
+            if station != GROUND:
+                seats[station].append(name)
+    return [merged_names(names) if names else "" for names in seats]
 
 
 def bearing_places(model: GearboxModel) -> np.ndarray:

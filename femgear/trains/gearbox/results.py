@@ -13,7 +13,7 @@ import numpy as np
 from femgear.case.gear_set import planetary_set
 from femgear.case.load_spectrum import running_shares
 from femgear.case.messages import estimated_materials
-from femgear.case.quantities import RPM
+from femgear.case.quantities import LENGTH, RPM
 from femgear.errors import GeometryError
 from femgear.findings import DOUBT, FAULT, Finding
 from femgear.gears.checks import check_meshes
@@ -37,7 +37,13 @@ from femgear.trains.gearbox.casing_results import (
 from femgear.trains.gearbox.deflection import Deflection
 from femgear.trains.gearbox.geometry import planet_distance, planet_radius, set_sizes
 from femgear.trains.gearbox.life import bearing_life_findings, describe_load_cases, life_text, life_variables
-from femgear.trains.gearbox.model import StageModel, bearing_motions, bearing_places, member_of_stations
+from femgear.trains.gearbox.model import (
+    StageModel,
+    bearing_motions,
+    bearing_places,
+    member_of_stations,
+    seats_of_stations,
+)
 from femgear.trains.gearbox.modes import GearboxModes
 from femgear.trains.gearbox.overlaps import common_faces, overlaps
 from femgear.trains.gearbox.planet_shafts import standing_planets
@@ -186,6 +192,12 @@ class DeflectionResult(StageResult):
                 np.array(member_of_stations(state.model))[shown].tolist(),
                 "1",
                 "shaft or planets of the station",
+            ),
+            "seat": (
+                "station",
+                np.array(seats_of_stations(state.model))[shown].tolist(),
+                "1",
+                "gears and bearings at the station",
             ),
         }
         coords |= casing_coordinates(state) | sensor_coordinates(state.model)
@@ -550,12 +562,22 @@ def _large(data: xr.Dataset) -> Iterator[Finding]:
     if tilts.max(initial=0.0) > _LARGEST_TILT:
         case, station, _ = np.unravel_index(int(tilts.argmax()), tilts.shape)
         text = (
-            f"{data['station'].values[station]} tilts by {1e3 * tilts.max():.3g} mrad in "
+            f"{_place_in_words(data, int(station))} tilts by {1e3 * tilts.max():.3g} mrad in "
             f"{named_load_case(str(data['load_case'].values[case]))}: the model is one of small motions"
         )
         remedy = "less torque, or stiffer shafts and bearings"
         severity, limit = FAULT if tilts.max() > _FAR * _LARGEST_TILT else DOUBT, f"{1e3 * _LARGEST_TILT:g} mrad"
         yield Finding("W-DEFLECTION", "operation.load_case", text, remedy=remedy, limit=limit, severity=severity)
+
+
+def _place_in_words(data: xr.Dataset, station: int) -> str:
+    """Shaft of a station, where on it, and what sits there: "planet 1, 30 mm from its left end (sun-planet 1)"."""
+    member, seat, along = str(data["member"].values[station]), data["seat"].values[station], data["place"].values[:, 2]
+    of_shaft = along[data["member"].values == member]
+    words = member
+    if np.ptp(of_shaft) > 0.0:
+        words += f", {LENGTH.show(along[station] - of_shaft.min())} from its left end"
+    return f"{words} ({seat})" if seat else words
 
 
 def gearbox_modes_warnings(data: xr.Dataset) -> Iterator[Finding]:

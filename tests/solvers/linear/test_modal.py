@@ -223,3 +223,19 @@ def test_rounding_chooses_neither_sign_nor_pair():
             np.testing.assert_allclose(shape[row, pair[1:]], 0.0, atol=1e-9)
             largest = shape[np.abs(shape[:, pair]).argmax(axis=0), pair]
             assert np.all(largest > 0.0) or len(pair) > 1
+
+
+def test_soft_modes_are_told_from_rigid_ones_beside_very_light_parts():
+    """A free pair on a soft spring, with a part so light that rounding of its frequency hides both lowest modes."""
+    light, stiff, soft = 1e-9, 1e9, 1e3
+    mass = np.diag([1.0, 1.0, light])
+    columns = np.array([[1.0, 0.0], [-1.0, 1.0], [0.0, -1.0]])
+    system = MechanicalSystem(mass, np.zeros((3, 3)), np.zeros((3, 3)), columns, np.zeros(3), ("a", "b", "c"))
+    modes = undamped_modes(system, [soft, stiff], damping_ratio=0.0)
+    assert modes.kind == ("rigid", "elastic", "elastic")
+    expected = np.sqrt(2.0 * soft), np.sqrt(stiff / light)
+    np.testing.assert_allclose(2.0 * np.pi * modes.frequency[1:], expected, rtol=1e-6)
+    # both heavy ones against each other
+    np.testing.assert_allclose(np.abs(modes.shape[:2, 1]), np.sqrt(0.5), rtol=1e-6)
+    with pytest.raises(ConvergenceError, match="strains column 1 of W"):
+        undamped_modes(system, [0.0, stiff], damping_ratio=0.0)

@@ -293,6 +293,8 @@ def test_a_load_without_balance_names_a_bearing():
     assert (error.key, error.value) == ("bearing[3].clearance", "0.08 mm")
     assert "12.5 N" in error.message and error.limit and error.remedy
     assert without_balance(read_case(tables), "input", 2, 12.5).key == "bearing"
+    soft = without_balance(read_case(tables), "input", 5, 12.5)
+    assert soft.key == "shaft[0]" and "less torque" in soft.remedy and "clearance" not in str(soft)
 
 
 def _references(value, path=()):

@@ -1,6 +1,7 @@
 """Contents of the files of a gearbox, and what they say against themselves."""
 
 import math
+import re
 
 import numpy as np
 import pytest
@@ -135,6 +136,7 @@ def test_motions_that_are_not_small_are_told():
     # the flanks, and the shafts
     assert codes(found) == ["W-DEFLECTION", "W-DEFLECTION"]
     assert {one.severity for one in found} == {"fault"}
+    assert re.match(r"(input|output), [\d.]+ mm from its left end( \(.+\))? tilts by", found[1].text)
 
 
 def test_flanks_that_approach_too_far_are_told_where_nothing_tilts():
