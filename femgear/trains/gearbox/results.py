@@ -38,6 +38,7 @@ from femgear.trains.gearbox.deflection import Deflection
 from femgear.trains.gearbox.geometry import planet_distance, planet_radius, set_sizes
 from femgear.trains.gearbox.life import bearing_life_findings, describe_load_cases, life_text, life_variables
 from femgear.trains.gearbox.model import (
+    GearboxModel,
     StageModel,
     bearing_motions,
     bearing_places,
@@ -186,25 +187,23 @@ class DeflectionResult(StageResult):
             "motion": _names("motion", MOTIONS, "motion"),
             "other_motion": _names("other_motion", MOTIONS, "motion"),
             "axis": _names("axis", "xyz", "coordinate"),
-            "station": _names("station", [assembly.names[i] for i in shown], "station of a shaft, or planet"),
-            "member": (
-                "station",
-                np.array(member_of_stations(state.model))[shown].tolist(),
-                "1",
-                "shaft or planets of the station",
-            ),
-            "seat": (
-                "station",
-                np.array(seats_of_stations(state.model))[shown].tolist(),
-                "1",
-                "gears and bearings at the station",
-            ),
         }
+        coords |= _of_stations(state.model, shown)
         coords |= casing_coordinates(state) | sensor_coordinates(state.model)
         rated, gears, editions = strength_contents(every)
         lives, teeth, required = tooth_life_contents(every)
         attrs = {"title": "system deflection", "load_case": self.chosen} | editions | required
         return Contents(variables | rated | lives, coords | gears | teeth, attrs)
+
+
+def _of_stations(model: GearboxModel, shown: np.ndarray) -> dict[str, tuple]:
+    """Coordinates of some stations: their names, members and seats."""
+    member, seat = (np.array(names(model))[shown].tolist() for names in (member_of_stations, seats_of_stations))
+    return {
+        "station": _names("station", [model.assembly.names[i] for i in shown], "station of a shaft, or planet"),
+        "member": (("station",), member, "1", "shaft or planets of the station"),
+        "seat": (("station",), seat, "1", "gears and bearings at the station"),
+    }
 
 
 def _names(dim: str, names: Iterable[str], words: str) -> tuple:
