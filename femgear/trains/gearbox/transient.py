@@ -105,7 +105,7 @@ class GearboxInTime:
 def gearbox_in_time(
     found: Deflection, transient: TransientSection, *, steps: Steps | None = None, mean_damping: bool = True
 ) -> GearboxInTime:
-    """Make a gearbox ready for integration in time about its loaded found.
+    """Make a gearbox ready for integration in time about its loaded state.
 
     ``mean_damping`` is that of `femgear.trains.gearbox.nonlinear.nonlinear_gearbox`.
 
