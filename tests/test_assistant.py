@@ -10,6 +10,7 @@ import pytest
 from femgear.assistant import MOST_TEXT, SKILL, check_text, command, make_server, place_in
 from femgear.cli import main
 from femgear.errors import CaseError
+from femgear.trains.reading import read_case, with_values
 
 pytestmark = pytest.mark.usefixtures("pictures_undrawn")
 
@@ -33,7 +34,8 @@ def asked(server, *calls):
 
 def test_a_case_goes_from_new_to_its_answers(tmp_path):
     server = make_server(tmp_path)
-    text = CASE.read_text(encoding="utf-8")
+    few = {"static.positions": 8, "static.flank_elements": 6, "static.stresses": False}
+    text = with_values(read_case(CASE), few).source
     tools, answers = asked(
         server,
         ("write_case", {"name": "pair.toml", "text": text}),

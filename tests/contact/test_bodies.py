@@ -6,7 +6,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from femgear.contact.bodies import flank_widths, make_bodies, make_sectors
+from femgear.contact.bodies import (
+    active_flank_friction,
+    active_flank_load,
+    flank_widths,
+    make_bodies,
+    make_sectors,
+    station_weights,
+)
 from femgear.contact.cycle import CycleOptions, walk_mesh_cycle
 from femgear.contact.width_waves import width_waves
 from femgear.fe.elasticity import Material, stiffness
@@ -15,6 +22,7 @@ from femgear.gears.iso6336 import elasticity_factor
 from femgear.gears.iso6336_root import root_face_width
 from femgear.gears.iso6336_stiffness import material_factor
 from femgear.gears.pair import GearPair, close_pair
+from validation.planetary import reference_set
 
 STEEL, IRON = Material(206e9, 0.3, 7850.0), Material(110e9, 0.26, 7100.0)
 WIDTH, TORQUE = 0.02, 100.0
@@ -145,3 +153,29 @@ def test_waves_across_the_face_in_common_bend_no_more_than_that_part_of_a_wider_
         # of teeth half a gear apart nothing is local
         found.append([bodies.planet.regular[12, 3, 3] + one.planet.regular[12, 3, 3] for one in waves.bodies])
     assert found[0] == pytest.approx(found[1], abs=1e-9 * bodies.planet.regular[0].max())
+
+
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_friction_of_a_flank_is_across_its_load_and_a_turning_along_it(side):
+    """At every node; all friction together is a unit force, and the turning has a unit moment."""
+    gears = reference_set()
+    grid = make_sectors(gears, STEEL, flank_elements=6).ring.grid
+    load = active_flank_load(grid, gears, side).reshape(-1, 2)
+    friction, couple = active_flank_friction(grid, gears, side).T.reshape(2, -1, 2)
+    assert np.abs((load * friction).sum(axis=1)).max() < 1e-12
+    assert np.linalg.norm(friction, axis=1) == pytest.approx(np.linalg.norm(load, axis=1), abs=1e-12)
+    assert np.linalg.norm(friction, axis=1).sum() == pytest.approx(1.0)
+    turning = load[:, 0] * couple[:, 1] - load[:, 1] * couple[:, 0]
+    assert np.abs(turning).max() < 1e-9 * np.abs(couple).max()
+    arm = grid.points - np.linalg.norm(load, axis=1) @ grid.points
+    moment = (arm[:, 0] * couple[:, 1] - arm[:, 1] * couple[:, 0]).sum()
+    # planets turn clockwise while the left flank of the ring carries
+    assert moment == pytest.approx(-side)
+
+
+def test_cubics_are_interpolated_exactly_and_continued_by_half_a_spacing():
+    def cubic(x):
+        return 1.0 - 2.0 * x + 0.5 * x**2 - 0.25 * x**3
+
+    index, weight = station_weights(np.array([-3.0, -0.4, 0.3, 2.6, 5.4, 9.0]), np.arange(6.0))
+    assert (weight * cubic(index)).sum(axis=-1) == pytest.approx(cubic(np.array([-0.5, -0.4, 0.3, 2.6, 5.4, 5.5])))

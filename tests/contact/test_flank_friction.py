@@ -1,6 +1,8 @@
 """Friction in the equilibrium of the contact: closed forms, balances of every body, power, other solvers."""
 
 from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -8,7 +10,7 @@ import pytest
 from femgear.contact import batch
 from femgear.contact.bodies import make_bodies, make_sectors
 from femgear.contact.cycle import CycleOptions, walk_mesh_cycle
-from femgear.contact.flank_friction import path_sense, rolls_over_radii
+from femgear.contact.flank_friction import friction_of_record, path_sense, rolls_over_radii
 from femgear.contact.loaded_period import loaded_period
 from femgear.contact.supports import RIGID, Supports
 from femgear.contact.width_waves import width_waves
@@ -148,6 +150,16 @@ def test_positions_by_themselves_agree(uneven, monkeypatch):
             alone = rubbed(gears, bodies, supports=supports, places=PLACES[::4])
         assert alone.force == pytest.approx(together.force, rel=1e-9)
         assert alone.iterations.sum() != together.iterations.sum()
+
+
+def test_friction_of_slices_has_the_arms_of_their_own_paths():
+    """Two slices of a helical tooth, the second one 0.3 base pitches ahead: before the pitch point, and beyond it."""
+    gears: Any = SimpleNamespace(base_pitch=0.01, of_kinds=np.array)
+    load = np.array([5.0, 8.0]).reshape(1, 1, 2, 1)
+    record = SimpleNamespace(path=np.full((1, 1, 1), -0.001), tooth_load=load.sum(axis=2) / 2, slice_load=load)
+    found = friction_of_record(gears, (0.1,), record, np.array([0.0, 0.3]))
+    assert found["friction_force"] == pytest.approx(np.array([[0.1 * (8.0 - 5.0) / 2]]))
+    assert found["friction_moment"] == pytest.approx(np.array([[0.1 * (8.0 * 0.002 + 5.0 * 0.001) / 2]]))
 
 
 def test_no_friction_is_none(planets):

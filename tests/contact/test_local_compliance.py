@@ -5,6 +5,7 @@ import pytest
 from scipy.integrate import quad
 from scipy.linalg import toeplitz
 
+from femgear.contact import local_compliance
 from femgear.contact.local_compliance import depth_displacement, surface_displacement
 from femgear.contact.windows import _window_compliance
 from validation.reference.hertz import (
@@ -169,3 +170,29 @@ def test_no_load_no_contact():
 def test_relative_radius_of_a_hollow_surface():
     assert relative_radius(0.05, -0.075) == pytest.approx(0.15)
     assert relative_radius(0.05, np.float64(1e9)) == pytest.approx(0.05)
+
+
+@pytest.mark.parametrize(("r", "theta"), [(0.7, 0.5), (1.6, 1.2), (0.3, 1.8)])
+def test_displacements_beneath_a_corner_have_the_strain_of_their_stresses(r, theta):
+    """Stresses of Airy's function ``r^(p + 1) f(theta)`` in polar coordinates (Timoshenko and Goodier, section 27)."""
+    angle, step = 2.0, 1e-5
+    omega = np.arange(0.0, local_compliance._LAST + 0.5 * local_compliance._STEP, local_compliance._STEP)
+    power = local_compliance._REAL_PART + 1j * omega
+    up, down = power + 1, power - 1
+    wedge, plane = (local_compliance._stress_function(one, power) for one in (angle, np.pi))
+    A, B, C, D = (wedge - plane) * np.where(omega == 0, 0.5, 1.0) * local_compliance._STEP / np.pi
+    f = A * np.cos(up * theta) + B * np.sin(up * theta) + C * np.cos(down * theta) + D * np.sin(down * theta)
+    first = up * (B * np.cos(up * theta) - A * np.sin(up * theta))
+    first = first + down * (D * np.cos(down * theta) - C * np.sin(down * theta))
+    second = -(up**2) * (A * np.cos(up * theta) + B * np.sin(up * theta))
+    second = second - down**2 * (C * np.cos(down * theta) + D * np.sin(down * theta))
+    radial, hoop, shear = (
+        float(np.real(part * r**down).sum()) for part in (up * f + second, power * up * f, -power * first)
+    )
+    sine, cosine = np.sin(theta), np.cos(theta)
+    along = radial * sine**2 + hoop * cosine**2 + 2.0 * shear * sine * cosine
+    x, y = r * cosine, r * sine
+    upper, lower = (
+        float(local_compliance._excess(angle, np.hypot(x, at), np.arctan2(at, x), NU)) for at in (y + step, y - step)
+    )
+    assert (upper - lower) / (2.0 * step) == pytest.approx(0.5 * (along - NU * (radial + hoop)), rel=1e-5)
