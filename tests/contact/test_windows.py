@@ -1,12 +1,18 @@
 """Windows of pressure cells: how wide a contact is taken to be, and pairs that errors hold apart."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
+from femgear.contact.bodies import make_bodies, make_sectors
 from femgear.contact.flank_pairs import flank_pair
-from femgear.contact.windows import _contact_half_width, windows
+from femgear.contact.windows import _contact_half_width, mesh_windows, windows
 from femgear.fe.elasticity import Material
+from femgear.gears.deviations import no_deviations
+from femgear.gears.faults import LEFT, Spall, missing_length
 from femgear.gears.gear import Gear
+from validation.planetary import reference_set
 
 ALPHA = np.deg2rad(20)
 
@@ -42,3 +48,16 @@ def test_errors_of_position_add_to_the_separation_of_a_whole_pair(pair):
     plain, held = windows(pair, zeta, **options), windows(pair, zeta, shift=[0.0, 7e-6, 0.0], **options)
     assert held.gap - plain.gap == pytest.approx(np.array([0, 7e-6, 0])[:, None] * np.ones(11), abs=1e-18)
     assert plain.near.tolist() == [True, True, True] and held.near.tolist() == [True, False, True]
+
+
+def test_windows_reach_over_a_pit_to_both_sides_of_it():
+    """By its length to either side, with more cells; those of meshes whose teeth are whole stay."""
+    gears, steel = reference_set(), Material(206e9, 0.3, 7850.0)
+    bodies = make_bodies(make_sectors(gears, steel, flank_elements=6), steel)
+    pit = Spall(0, 0, 3, LEFT, low=8.4e-3, high=8.6e-3, depth=40e-6)
+    options = {"share": 4e3, "nearest": 20e-6, "positions": 2}
+    whole = mesh_windows(gears, bodies, **options)
+    over = mesh_windows(gears, bodies, **options, deviations=replace(no_deviations(gears), faults=(pit,)))
+    widths = [setup.cell_area[:, 0].sum(axis=-1) / gears.sun.face_width for setup in (whole, over)]
+    assert widths[1][:3] - widths[0][:3] == pytest.approx(2.0 * missing_length(pit, gears), rel=1e-9)
+    assert widths[1][3:] == pytest.approx(widths[0][3:], rel=1e-9) and over.cells > whole.cells
