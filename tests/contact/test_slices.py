@@ -224,6 +224,7 @@ def test_the_mirror_image_over_the_width_is_that_of_the_mirrored_lead(gears, bod
     one, other = (walk(gears, bodies, waves, LeadSlope(sign * 8e-6), EndRelief(5e-6, 4e-3)) for sign in (1, -1))
     assert np.abs(one.slice_load - other.slice_load[:, :, ::-1]).max() < 1e-9 * one.slice_load.max()
     assert np.abs(one.stiffness - other.stiffness).max() < 1e-9 * one.stiffness.max()
+    assert (one.iterations > 0).all()
 
 
 def _no_coupling(found, some, waves, count):

@@ -70,3 +70,12 @@ def test_one_linear_system_of_all_harmonics_gives_the_same_forces(sense, symmetr
     found = solve_two_way(*data, [speed], harmonics=(2, 4), coupled_diameters=coupled, tolerance=1e-13)
     direct = direct_forces(*data, speed, harmonics=(2, 4), coupled=coupled)
     assert farthest_apart(found, 0, *direct) < 1e-9
+
+
+def test_errors_that_turn_give_the_forces_of_one_linear_system():
+    """Over three mesh periods, of which 97 teeth are no multiple: most orders are no whole numbers."""
+    drive, structure = shaken(paths(1), 3), feet(2)
+    data = rigid_modes(paths(1), drive), drive, structure, paths(1)
+    found = solve_two_way(*data, [40.0], harmonics=(1, 2), tolerance=1e-13)
+    direct = direct_forces(*data, 40.0, harmonics=(1, 2), coupled=2)
+    assert farthest_apart(found, 0, *direct) < 1e-9

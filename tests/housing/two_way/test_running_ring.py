@@ -6,6 +6,8 @@ import numpy as np
 import pytest
 from running_twin import TURN, running, twin
 
+from femgear.housing.two_way import running_ring
+from femgear.housing.two_way.carrier_orders import CarrierOrders, MeshPaths
 from femgear.housing.two_way.running_planets import RING, ring_lines, solve_running
 from femgear.housing.two_way.running_ring import RunningRing
 
@@ -74,3 +76,17 @@ def test_waves_are_those_of_a_structure_with_the_same_modes(count, teeth, sense,
     common = np.isin(wanted.band, response.band), np.isin(response.band, wanted.band)
     assert np.abs(heard[:, common[1]] - expected[:, common[0]]).max() < 1e-10 * np.abs(expected).max()
     assert np.abs(expected).max() > 0.0
+
+
+@pytest.mark.parametrize("sense", [1, -1])
+def test_planets_in_a_pattern_cancel_in_all_waves_but_some(sense):
+    """What planet j makes of a wave n is that of the first one times a phase, by the head of `carrier_orders`."""
+    places = 2.0 * np.pi * np.arange(3) / 3
+    paths = MeshPaths(41, tuple(places), symmetry=3)
+    orders = CarrierOrders(paths, lines=2, max_diameter=3, side_bands=4, sense=sense, patterns=3)
+    elastic, blocks = ring(), np.arange(9)
+    whole = (orders.base + orders.pattern)[:, None] + orders.bands
+    waves = elastic.waves[0]
+    phases = np.exp(1j * (sense * whole[..., None, None] - waves[:, None]) * places)
+    met = running_ring._met(elastic, orders, blocks, orders.bands)
+    assert np.array_equal(met, np.abs(phases.sum(axis=-1)) > 1.0)

@@ -10,6 +10,7 @@ from femgear.housing.two_way.response import MeshPaths, solve_two_way, structure
 from femgear.housing.two_way.structure import Support, circumferential, equal_sectors, ring_waves, supported_ring
 from femgear.solvers.linear.modal import modal_damping, undamped_modes
 from validation.fixed_housing import EQUAL, FEET, excitation, gears, joined, thin_ring
+from validation.reference.two_way_direct import direct_damped_forces, farthest_apart
 
 RING = thin_ring(4, foundation=2e10)
 STRUCTURE = supported_ring(RING, FEET, max_diameter=4, max_frequency=1e6, damping_ratio=0.04, sensor_angles=(0.3, 2.0))
@@ -33,6 +34,19 @@ def test_waves_are_those_of_the_circumferential_components():
     own = STRUCTURE.wave_order[:, None] == np.arange(-4, 5)
     assert np.abs(component[own]).min() > 1e-3
     np.testing.assert_allclose(component[~own], 0.0, atol=1e-15)
+
+
+def test_one_linear_system_of_all_harmonics_gives_the_same_forces():
+    paths, ring = MeshPaths(37, EQUAL, 0.1, 1), thin_ring(2, foundation=2e10)
+    structure = supported_ring(ring, FEET, max_diameter=2, max_frequency=1e6, damping_ratio=0.03)
+    drive = excitation(paths, -1)
+    mean = drive.stiffness.mean(axis=1)
+    matrix = modal_damping(joined(paths, ring, 2), mean, 0.04)
+    modes = undamped_modes(gears(EQUAL), mean, damping_ratio=0.04)
+    data = modes, drive, structure, paths
+    found = solve_two_way(*data, [-20.0], harmonics=(1, 3), damping=matrix, tolerance=1e-13)
+    direct = direct_damped_forces(*data, -20.0, matrix, harmonics=(1, 3))
+    assert farthest_apart(found, 0, *direct) < 1e-9
 
 
 def test_one_planet_stands_for_three():

@@ -87,6 +87,7 @@ def chain(load):
     return NonlinearSystem(system, elements, (HarmonicForce(np.array([0.05, -0.05, 0.0]), (1,)),))
 
 
+@pytest.mark.decisive
 def test_the_column_that_lacks_its_force_is_named():
     """(p, 0, -p) presses both or pulls both: only the contact, column 2, cannot pull."""
     load = np.array([0.5, 0.0, -0.5])
