@@ -392,7 +392,15 @@ def _place_of(text: Any, x, y, ax: Any) -> dict[str, Any]:
     if ax.name == "polar":
         plane = _plane(np.array([x]), np.array([y]), ax.get_rorigin())
         return {name: value[0] for name, value in plane.items()}
-    return {name: _numbers([value])[0] for name, value in (("x", x), ("y", y))}
+    return {name: _within(value, ends) for name, value, ends in (("x", x, ax.get_xlim()), ("y", y, ax.get_ylim()))}
+
+
+def _within(value: float, ends: tuple[float, float]) -> float | None:
+    """Round a coordinate of a word, not beyond the ends of its axis: a browser drops words that are outside."""
+    rounded, (low, high) = _numbers([value])[0], sorted(map(float, ends))
+    if rounded is None or not low <= value <= high:
+        return rounded
+    return min(max(rounded, low), high)
 
 
 def _width(points: float) -> float:

@@ -188,3 +188,16 @@ def test_document_names_the_checksums_of_its_scripts_and_hides_hostile_text():
     packed = re.search(r'id="data">([^<]*)<', text)[1]
     assert json.loads(zlib.decompress(base64.b64decode(packed)))["charts"]["a"]["title"] == hostile
     assert "script-src 'none'" in document("x", "", None)
+
+
+def test_rounding_takes_no_word_beyond_the_end_of_its_axis():
+    """A browser drops words outside: the end of an axis may lie below its own rounding."""
+    end = np.nextafter(1500.0, 0.0)
+
+    def draw(ax):
+        ax.set_xlim(0.0, end)
+        ax.annotate("at the end", (end, 0.5), (4, 0), textcoords="offset points")
+        ax.annotate("beyond", (1501.0, 0.5), (4, 0), textcoords="offset points")
+
+    there, beyond = panel(draw)["words"]
+    assert there["x"] == end and beyond["x"] == 1501.0
