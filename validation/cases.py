@@ -19,7 +19,11 @@ format = 1
 title = "Planetary set 27/40/108"
 set = { planets = 3, centre_distance = "51 mm", face_width = "25 mm" }
 rack = { addendum = 1.0, dedendum = 1.25, root_radius = 0.25 }
-material = { youngs_modulus = "206 GPa", poisson_ratio = 0.3, density = "7850 kg/m^3" }
+material.youngs_modulus = "206 GPa"
+material.poisson_ratio = 0.3
+material.density = "7850 kg/m^3"
+material.treatment = "case hardened steel"
+material.hardness = 700
 carrier = { mass = "3 kg", inertia = "6e-3 kg m^2", support_stiffness = "2e8 N/m" }
 motor = { inertia = "0.02 kg m^2", coupling_stiffness = "400 N m/rad" }
 brake = { inertia = "0.2 kg m^2", coupling_stiffness = "5000 N m/rad" }
@@ -54,6 +58,7 @@ outer_radius = "100 mm"
 cutter_teeth = 30
 foundation_radial = "1e10 N/m^3"
 foundation_tangential = "1e10 N/m^3"
+material = { treatment = "through hardened alloy steel", hardness = 300 }
 
 [operation]
 input = "sun"

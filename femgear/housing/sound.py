@@ -333,6 +333,12 @@ def pressure_level(pressure, frequency) -> np.ndarray:
     return _decibels((weighted**2).sum(axis=-1) / 2, REFERENCE_PRESSURE**2)
 
 
+def acceleration_level(acceleration, frequency) -> np.ndarray:
+    """Compute the A-weighted level [dB re 1 um/s^2] of lines (..., n_orders) of the acceleration [m/s^2, peak]."""
+    weighted = np.abs(acceleration) * a_weighting(frequency)
+    return _decibels((weighted**2).sum(axis=-1) / 2, REFERENCE_ACCELERATION**2)
+
+
 def power_level(power, frequency) -> np.ndarray:
     """Compute the A-weighted sound power level [dB re 1 pW] of the power of lines (..., n_orders) [W]."""
     return _decibels((power * a_weighting(frequency) ** 2).sum(axis=-1), REFERENCE_POWER)

@@ -58,8 +58,8 @@ def chart(figure: Figure) -> dict[str, Any] | None:
     -------
     dict or None
         What JSON can hold: ``title``, ``size`` [in], ``rows``, ``columns``, and for every panel its place,
-        axes and traces, named as plotly.js names them; None where a part of the figure is neither a line, an
-        area, a bar, a field nor a text.
+        axes and traces, named as plotly.js names them, and ``over``, the panel on which it lies with an ordinate
+        at the right; None where a part of the figure is neither a line, an area, a bar, a field nor a text.
     """
     bars = {id(coloured.colorbar.ax) for coloured in _fields(figure)}
     panels = [ax for ax in figure.axes if id(ax) not in bars]
@@ -99,6 +99,7 @@ def _panel(ax: Any, number: int, panels: list[Any]) -> dict[str, Any]:
     plane = {"x": {"hidden": True}, "y": {"hidden": True}} if polar or not ax.axison else {}
     shared = next((i for i, other in enumerate(panels) if ax.get_shared_x_axes().joined(ax, other)), number)
     traces = [*_areas(ax), *_lines(ax), *_patches(ax)]
+    over = next((i for i, other in enumerate(panels[:number]) if _twins(ax, other)), None)
     return (
         {
             "place": [spec.rowspan.start, spec.rowspan.stop, spec.colspan.start, spec.colspan.stop] if spec else [],
@@ -110,9 +111,16 @@ def _panel(ax: Any, number: int, panels: list[Any]) -> dict[str, Any]:
             "traces": (_circles(ax) if polar else []) + traces,
             "words": _words(ax),
         }
+        | ({} if over is None else {"over": over})
         | plane
         | (_polar_limits(ax) if polar else {})
     )
+
+
+def _twins(ax: Any, other: Any) -> bool:
+    """Tell whether axes lie over others, with the same abscissa."""
+    same = ax.get_subplotspec() is not None and ax.get_subplotspec() == other.get_subplotspec()
+    return same and ax.get_shared_x_axes().joined(ax, other)
 
 
 def _polar_limits(ax: Any) -> dict[str, Any]:

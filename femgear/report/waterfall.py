@@ -36,7 +36,8 @@ if TYPE_CHECKING:
 RUNUP_CAPTIONS = {
     "run_up_levels": (
         "Over the speed: level at the sensor with its strongest resonances (mode × mesh harmonic), "
-        "fluctuation of the mesh forces, and dynamic factor K_v, largest over mean mesh force. Dots: "
+        "fluctuation of the mesh forces, and dynamic factor K_v, largest over mean mesh force. Blue: the level "
+        "with lines weighted as the ear does. Dots: "
         "operating speeds, with the excitation of the run-up."
     ),
     "campbell": (
@@ -231,10 +232,13 @@ def _doubt(figure: Figure, runup: xr.Dataset) -> None:
         figure.suptitle(f"{speed.min():.4g} to {speed.max():.4g} rpm: {words}", fontsize=12)
 
 
-def runup_levels(runup: xr.Dataset, limit: np.ndarray | None = None) -> Figure:
+def runup_levels(
+    runup: xr.Dataset, limit: np.ndarray | None = None, weighted: tuple[str, np.ndarray] | None = None
+) -> Figure:
     """Draw level, fluctuation of the mesh forces and dynamic factors of runup.nc over the speed.
 
-    ``limit`` (speeds,) is the largest level allowed [m/s^2].
+    ``limit`` (speeds,) is the largest level allowed [m/s^2], ``weighted`` what the ear hears of the level: its words
+    and values (speeds,) [dB(A)], which have an axis at the right.
     """
     figure, axes = new_figure(rows=3, height=7.4, sharex=True)
     speed, level = runup["speed"].values, runup["level"].values
@@ -250,6 +254,11 @@ def runup_levels(runup: xr.Dataset, limit: np.ndarray | None = None) -> Figure:
         words += f"\nexcited up to {1e-3 * runup['excitation_limit'].values.max():.4g} kHz"
     if short.any():
         words += f"\ndotted: {_ends_short(runup)}"
+    if weighted is not None:
+        _draw_weighted(axes[0].twinx(), speed, *weighted)
+        # names of resonances stand over it
+        axes[0].set_zorder(1)
+        axes[0].patch.set_visible(False)
     label(axes[0], y="level, r.m.s. [m/s²]", title=words)
     _name_resonances(axes[0], runup)
     operating = np.atleast_1d(runup.attrs["operating_speeds"])
@@ -269,6 +278,20 @@ def runup_levels(runup: xr.Dataset, limit: np.ndarray | None = None) -> Figure:
     label(axes[1], y="mesh force, r.m.s.\nabout its mean [N]")
     label(axes[2], "speed of the input [rpm]", "dynamic factor K_v [1]")
     return figure
+
+
+def _draw_weighted(ax, speed: np.ndarray, words: str, level: np.ndarray) -> None:
+    """Draw a level (speeds,) [dB(A)] with an ordinate at the right."""
+    heard = level[np.isfinite(level)]
+    ax.plot(speed, np.where(np.isfinite(level), level, np.nan), color=BLUE, linewidth=1.4)
+    if len(heard):
+        low, high = heard.min(), heard.max()
+        # as much room for the names of resonances as on the left
+        ax.set_ylim(low - 2.0, low + 1.45 * max(high - low, 10.0))
+    ax.grid(False)
+    ax.spines["top"].set_visible(False)
+    ax.tick_params(labelsize=SIZE - 1, colors=BLUE)
+    ax.set_ylabel(words, fontsize=SIZE, color=BLUE)
 
 
 def _short(runup: xr.Dataset) -> np.ndarray:
@@ -322,11 +345,16 @@ def _name_resonances(ax, runup: xr.Dataset) -> None:
         )
 
 
-def runup_figures(runup: xr.Dataset, modes: xr.Dataset, limit: np.ndarray | None = None) -> Drawings:
-    """Draw the figures of a run-up by the names of their files; ``limit`` (n_speeds,) as of `runup_levels`."""
+def runup_figures(
+    runup: xr.Dataset,
+    modes: xr.Dataset,
+    limit: np.ndarray | None = None,
+    weighted: tuple[str, np.ndarray] | None = None,
+) -> Drawings:
+    """Draw the figures of a run-up by the names of their files; ``limit`` and ``weighted`` as of `runup_levels`."""
     return Drawings(
         {
-            "run_up_levels": partial(runup_levels, runup, limit),
+            "run_up_levels": partial(runup_levels, runup, limit, weighted),
             "campbell": partial(campbell_diagram, runup, modes),
             "waterfall": partial(waterfall, runup),
             "order_cuts": partial(draw_order_cuts, runup),

@@ -3,6 +3,7 @@
 from pathlib import Path
 
 import pytest
+from steels import NO_STEELS
 
 from femgear.case.estimates import estimates
 from femgear.case.gear_set import materials_of, planetary_set, set_deviations
@@ -20,7 +21,7 @@ CASES = Path(__file__).parents[2] / "cases"
 
 @pytest.fixture(scope="module")
 def case():
-    return read_case(CASES / "planetary_27_40_108.toml")
+    return with_values(read_case(CASES / "planetary_27_40_108.toml"), NO_STEELS)
 
 
 @pytest.fixture(scope="module")

@@ -12,6 +12,7 @@ from femgear.housing.sound import (
     Cylinder,
     Microphone,
     a_weighting,
+    acceleration_level,
     levels_of,
     microphone_lines,
     nodal_diameters,
@@ -140,6 +141,7 @@ def test_levels_add_powers_and_weigh_frequencies():
     twice = pressure_level(np.sqrt(2) * np.ones(2), np.array([1000.0, 1000.0]))
     assert twice == pytest.approx(93.979 + 3.010, abs=1e-3)
     assert power_level(np.array([1e-3]), np.array([1000.0])) == pytest.approx(90.0, abs=1e-3)
+    assert acceleration_level(np.sqrt(2) * np.ones(1), np.array([1000.0])) == pytest.approx(120.0, abs=1e-3)
     assert a_weighting(0.0) == 0.0 and pressure_level(np.zeros(2), np.zeros(2)) == -np.inf
 
 

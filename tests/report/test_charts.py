@@ -180,6 +180,16 @@ def test_words_stand_where_they_stood():
     assert inside["paper"] and inside["x"] == 0.1
 
 
+def test_axes_with_an_ordinate_at_the_right_lie_over_their_panel():
+    figure, (upper, lower) = new_figure(rows=2, sharex=True)
+    upper.plot([0, 1], [2, 3])
+    lower.plot([0, 1], [4, 5])
+    upper.twinx().plot([0, 1], [60, 70], color="#0072B2")
+    panels = chart(figure)["panels"]
+    assert [one.get("over") for one in panels] == [None, None, 0]
+    assert panels[2]["place"] == panels[0]["place"] and panels[2]["traces"][0]["y"] == [60.0, 70.0]
+
+
 def test_document_names_the_checksums_of_its_scripts_and_hides_hostile_text():
     hostile = "</script><script>alert(1)</script>"
     text = document(hostile, "<h1>x</h1>", {"charts": {"a": {"title": hostile}}})

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 from edited_manifests import finish
+from steels import NO_STEELS
 
 from femgear.errors import StorageError
 from femgear.report import style
@@ -16,7 +17,7 @@ from femgear.stages import static_figures as static_figures
 from femgear.storage.files import write_dataset, write_text
 from femgear.storage.results import prepare_output
 from femgear.trains.elastic.stages import ELASTIC
-from femgear.trains.reading import open_results, parse_case, read_case, with_value
+from femgear.trains.reading import open_results, parse_case, read_case, with_value, with_values
 
 pytestmark = pytest.mark.usefixtures("pictures_undrawn")
 
@@ -234,7 +235,8 @@ def test_page_one_answers_the_questions_of_a_set(tmp_path):
         if stage == "dynamics":
             data["converged"].values[1] = False
 
-    text = html(ELASTIC, open_results(make_run(tmp_path / "out", change=change)))
+    unrated = with_values(read_case(CASE), NO_STEELS)
+    text = html(ELASTIC, open_results(make_run(tmp_path / "out", case=unrated, change=change)))
     front = text[text.index('<section class="front"') : text.index("</section>")]
     states = re.findall(r'<li class="card (\w+)"><p class="question">([^<?]*\?) <b>(.) ([^<]*)</b>', front)
     questions = {question: state for state, question, _, _ in states}

@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from steels import NO_STEELS
 
 from femgear.case.gear_set import planetary_set
 from femgear.gears.iso6336 import overlap_of
@@ -59,7 +60,7 @@ def helical():
 
 @pytest.fixture(scope="module")
 def planetary():
-    return read_case(CASES / "planetary_27_40_108.toml")
+    return with_values(read_case(CASES / "planetary_27_40_108.toml"), NO_STEELS)
 
 
 def test_edition_of_the_case_decides_the_stresses(helical):

@@ -6,6 +6,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 import xarray as xr
+from steels import NO_STEELS
 
 from femgear.stages.strength import rate_case
 from femgear.stages.strength_results import (
@@ -35,7 +36,7 @@ def pair():
 
 @pytest.fixture(scope="module")
 def planetary():
-    return read_case(CASES / "planetary_27_40_108.toml")
+    return with_values(read_case(CASES / "planetary_27_40_108.toml"), NO_STEELS)
 
 
 def test_the_smallest_safety_stands_with_its_cause(planetary):

@@ -24,7 +24,8 @@ def draw(report: Path, picture: Path) -> None:
         browser.close()
     with Image.open(picture) as large:
         small = large.convert("RGB").resize((_WIDTH, large.height * _WIDTH // large.width), Image.Resampling.LANCZOS)
-    small.quantize(_COLOURS, Image.Quantize.MAXCOVERAGE).save(picture, optimize=True)
+    few = small.quantize(_COLOURS, Image.Quantize.MAXCOVERAGE, kmeans=2, dither=Image.Dither.NONE)
+    few.save(picture, optimize=True)
 
 
 if __name__ == "__main__":

@@ -108,9 +108,11 @@ page.overhang = (chart, columns, width) => Math.max(20, ...chart.panels.flatMap(
 })));
 
 page.arrange = (chart, width) => {
+  const own = chart.panels.filter((panel) => panel.over === undefined);
   const single = width < 620 && chart.columns > 1, hidden = chart.panels.every((panel) => panel.x.hidden);
-  const rows = single ? chart.panels.length : chart.rows, columns = single ? 1 : chart.columns;
-  const left = 70, right = page.overhang(chart, columns, width - 90), across = hidden ? 10 : 78;
+  const rows = single ? own.length : chart.rows, columns = single ? 1 : chart.columns;
+  const left = 70, twin = own.length < chart.panels.length ? 78 : 0;
+  const right = Math.max(page.overhang(chart, columns, width - 90), twin), across = hidden ? 10 : 78;
   // as much room above the panels as their titles need, and as that of all needs
   const pixels = (width - left - right + across) / columns - across;
   const lines = Math.max(1, ...chart.panels.map((panel) => page.wrapped(panel.title, pixels).lines));
@@ -121,7 +123,8 @@ page.arrange = (chart, width) => {
   const cell = chart.panels[0].square ? Math.min((width - 40) / columns, 460) * 1.02 : single ? 250 : Math.min(Math.max((width * ratio) / rows, chart.least || 210), 340);
   const height = rows * cell + gaps.top + gaps.bottom;
   const inner = { w: width - gaps.left - gaps.right, h: height - gaps.top - gaps.bottom };
-  const places = chart.panels.map((panel, i) => {
+  const places = chart.panels.map((panel, number) => {
+    const i = own.indexOf(panel.over === undefined ? panel : chart.panels[panel.over]);
     const [r0, r1, c0, c1] = single ? [i, i + 1, 0, 1] : panel.place;
     const dx = gaps.x / inner.w, dy = gaps.y / inner.h;
     const wide = (1 + dx) / columns, high = (1 + dy) / rows;
@@ -134,11 +137,12 @@ page.arrange = (chart, width) => {
 page.chartOf = (div) => {
   const chart = page.data.charts[div.dataset.chart];
   if (div.dataset.panel === undefined) return chart;
-  const panel = chart.panels[Number(div.dataset.panel)], titles = chart.panels.map(({ x }) => x.title).filter(Boolean);
+  const number = Number(div.dataset.panel), panel = chart.panels[number], titles = chart.panels.map(({ x }) => x.title).filter(Boolean);
   const x = { ...panel.x, title: panel.x.title || titles[titles.length - 1] };
   // slanted words at the ends of lines lie flat, which takes less room above the panel
   const words = panel.words.map((word) => (!word.paper && word.angle % 90 ? { ...word, angle: 0, align: ["center", word.align[1]] } : word));
-  return { ...chart, rows: 1, columns: 1, size: [8, div.closest(".many") ? 1.3 : div.closest(".both") || div.closest(".paper") ? 1.75 : 3.4], least: div.closest(".many") ? 90 : 110, title: "", panels: [{ ...panel, x, words, place: [0, 1, 0, 1], shared: 0 }] };
+  return { ...chart, rows: 1, columns: 1, size: [8, div.closest(".many") ? 1.3 : div.closest(".both") || div.closest(".paper") ? 1.75 : 3.4], least: div.closest(".many") ? 90 : 110, title: "", panels: [{ ...panel, x, words, place: [0, 1, 0, 1], shared: 0 },
+    ...chart.panels.filter(({ over }) => over === number).map((twin) => ({ ...twin, place: [0, 1, 0, 1], shared: 0, over: 0 }))] };
 };
 
 // the legend of a small chart has the largest curves, and tells how many more there are; returns its entries
@@ -163,12 +167,18 @@ page.draw = (div) => {
   if (chart.title) layout.title = { text: title, x: 0.01, xref: "container", y: 1, yref: "container", yanchor: "top", pad: { t: 18 }, font: { size: 15 } };
   chart.panels.forEach((panel, i) => {
     const end = i ? String(i + 1) : "", key = { x: "x" + end, y: "y" + end };
+    const under = panel.over === undefined ? null : panel.over ? String(panel.over + 1) : "";
+    if (under !== null) key.x = "x" + under;
     const place = places[i], first = panel.shared ? String(panel.shared + 1) : "";
     // titles are as long as their axes and the gap beside them; letters of titles are larger than those of words
     const long = (ends, side, gap) => 0.85 * ((ends[1] - ends[0]) * side + 0.6 * gap);
-    layout["xaxis" + end] = page.axis(panel.x, place.x, key.y, narrow, long(place.x, inner.w, gaps.x));
+    if (under === null) layout["xaxis" + end] = page.axis(panel.x, place.x, key.y, narrow, long(place.x, inner.w, gaps.x));
     layout["yaxis" + end] = page.axis(panel.y, place.y, key.x, false, long(place.y, inner.h, gaps.y));
-    if (panel.shared !== i) layout["xaxis" + end].matches = "x" + first;
+    if (under !== null) {
+      const colour = page.colour((panel.traces.find(({ line }) => line) || { line: {} }).line.color);
+      Object.assign(layout["yaxis" + end], { overlaying: "y" + under, side: "right", tickmode: "auto", nticks: 6, showgrid: false, tickfont: { color: colour }, linecolor: colour, tickcolor: colour });
+      layout["yaxis" + end].title.font = { color: colour };
+    } else if (panel.shared !== i) layout["xaxis" + end].matches = "x" + first;
     if (panel.square) Object.assign(layout["yaxis" + end], { scaleanchor: key.x, constrain: "domain" });
     key.height = place.y[1] - place.y[0];
     key.middle = (place.y[0] + place.y[1]) / 2;

@@ -29,7 +29,7 @@ from femgear.fe.elasticity import mass
 from femgear.fe.reduction import cyclic_modes, sector_basis
 from femgear.housing.orders import OrderSpectrum, analyse_band
 from femgear.housing.sensor import SensorLines, fixed_sensor_signal, stored_lines
-from femgear.housing.sound import REFERENCE_PRESSURE, nodal_diameters, stored_sound
+from femgear.housing.sound import REFERENCE_PRESSURE, acceleration_level, nodal_diameters, pressure_level, stored_sound
 from femgear.report.explorer import EXPLORER, explorer
 from femgear.report.response import (
     MODE_CAPTIONS,
@@ -523,15 +523,26 @@ def _on_supports(modes: xr.Dataset | None, static: xr.Dataset | None) -> xr.Data
 
 def _write_explorer(drawn: Drawn, folder: Path) -> list[str]:
     """What the page walks through of the run-up."""
-    runup, housing = drawn.data["runup"], drawn.data.get("housing")
-    pressure = None if housing is None else run_up_lines(runup, housing.attrs)[1]
-    content = explorer(runup, drawn.data["modes"], pressure, _level_limit(drawn))
+    content = explorer(drawn.data["runup"], drawn.data["modes"], _run_up_pressure(drawn), _level_limit(drawn))
     write_text(json.dumps(content, allow_nan=False, separators=(",", ":")), folder / EXPLORER)
     return [EXPLORER]
 
 
 def _runup_figures(drawn: Drawn) -> Drawings:
-    return runup_figures(drawn.data["runup"], drawn.data["modes"], _level_limit(drawn))
+    runup, pressure = drawn.data["runup"], _run_up_pressure(drawn)
+    frequency = runup["order"].values * np.abs(runup["carrier_speed"].values[:, None]) / (2.0 * np.pi)
+    if pressure is not None:
+        weighted = "microphone\n[dB(A) re 20 µPa]", pressure_level(pressure, frequency)
+    else:
+        lines = runup["lines_real"].values + 1j * runup["lines_imag"].values
+        weighted = "A-weighted level\n[dB(A) re 1 µm/s²]", acceleration_level(lines, frequency)
+    return runup_figures(runup, drawn.data["modes"], _level_limit(drawn), weighted)
+
+
+def _run_up_pressure(drawn: Drawn) -> np.ndarray | None:
+    """Lines of the sound pressure (speeds, orders) at the microphone [Pa]; None without one, or before its stage."""
+    housing = drawn.data.get("housing")
+    return None if housing is None else run_up_lines(drawn.data["runup"], housing.attrs)[1]
 
 
 def _level_limit(drawn: Drawn) -> np.ndarray | None:

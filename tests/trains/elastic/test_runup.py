@@ -4,6 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from steels import NO_STEELS
 
 from femgear.case.gear_set import planetary_set
 from femgear.case.quantities import RPM
@@ -15,6 +16,7 @@ from femgear.report.style import excited_to
 from femgear.report.tables import Marks, describe_response
 from femgear.report.waterfall import campbell_diagram, draw_order_cuts, runup_levels, waterfall
 from femgear.solvers.linear.resonances import unresolved
+from femgear.stages.protocol import Drawn
 from femgear.stages.static import solve_static, solve_stress
 from femgear.stages.static_results import describe_stress
 from femgear.storage.results import Manifest, Results
@@ -32,7 +34,7 @@ ROOT = Path(__file__).parents[3]
 @pytest.fixture(scope="module")
 def case():
     changes = {"static.flank_elements": 8, "runup.from": "900 rpm", "runup.to": "3500 rpm", "runup.count": 60}
-    return with_values(read_case(ROOT / "cases" / "planetary_27_40_108.toml"), changes)
+    return with_values(read_case(ROOT / "cases" / "planetary_27_40_108.toml"), changes | NO_STEELS)
 
 
 @pytest.fixture(scope="module")
@@ -522,3 +524,16 @@ def test_the_verdict_shows_errors_of_tiny_loads(case, files):
     told, _ = told_of(case, {"static": static, "stress": files["stress"]})
     said = next(text for name, text in told.items() if name.startswith("transmission error"))
     assert "0.000 um" not in said and "e-06 um" in said
+
+
+def test_the_curve_at_the_right_is_what_the_microphone_hears_at_the_operating_speeds(case, files):
+    figure = ELASTIC.figures["runup"].draw(Drawn(case, files))["run_up_levels"]
+    speed, heard = next(ax for ax in figure.axes if "dB(A)" in ax.get_ylabel()).get_lines()[0].get_data()
+    housing = files["housing"]
+    rpm = np.array(case.operation.speeds) / RPM
+    inside = (rpm >= speed[0]) & (rpm <= speed[-1])
+    expected = housing["pressure_level"].values[inside]
+    assert inside.any() and np.interp(rpm[inside], speed, heard) == pytest.approx(expected, abs=0.3)
+    alone = ELASTIC.figures["runup"].draw(Drawn(case, {name: files[name] for name in ("runup", "modes")}))
+    words = [ax.get_ylabel() for ax in alone["run_up_levels"].axes]
+    assert "A-weighted level\n[dB(A) re 1 µm/s²]" in words
