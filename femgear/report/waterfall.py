@@ -282,10 +282,10 @@ def runup_levels(
 
 def _draw_weighted(ax, speed: np.ndarray, words: str, level: np.ndarray) -> None:
     """Draw a level (speeds,) [dB(A)] with an ordinate at the right."""
-    heard = level[np.isfinite(level)]
+    audible = level[np.isfinite(level)]
     ax.plot(speed, np.where(np.isfinite(level), level, np.nan), color=BLUE, linewidth=1.4)
-    if len(heard):
-        low, high = heard.min(), heard.max()
+    if len(audible):
+        low, high = audible.min(), audible.max()
         # as much room for the names of resonances as on the left
         ax.set_ylim(low - 2.0, low + 1.45 * max(high - low, 10.0))
     ax.grid(False)
