@@ -351,7 +351,7 @@ def runup_figures(
     limit: np.ndarray | None = None,
     weighted: tuple[str, np.ndarray] | None = None,
 ) -> Drawings:
-    """Draw the figures of a run-up by the names of their files; ``limit`` and ``weighted`` as of `runup_levels`."""
+    """Draw the figures of a run-up by their names; ``limit`` (n_speeds,) and ``weighted`` as of `runup_levels`."""
     return Drawings(
         {
             "run_up_levels": partial(runup_levels, runup, limit, weighted),
