@@ -5,7 +5,7 @@ from __future__ import annotations
 import textwrap
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
 
 from cyclopts import Parameter
 
@@ -179,7 +179,9 @@ class ModelFiles:
     state_space
         File .npz or .mat: matrices A, B, C, D of the vibration, and what the meshes do over the angle.
     fmu
-        File .fmu: the vibration in time as functional mock-up unit, co-simulation by FMI 2.0.
+        File .fmu: the vibration in time as functional mock-up unit, for co-simulation.
+    fmi
+        Version of FMI of the unit, 2.0 or 3.0.
     stiffness_table
         File .csv, .mat or .npz: mesh stiffness and transmission error over the angle of the first gear.
     harmonics
@@ -190,6 +192,7 @@ class ModelFiles:
 
     state_space: Path | None = None
     fmu: Path | None = None
+    fmi: Literal[2, 3] = 2
     stiffness_table: Path | None = None
     harmonics: Whole | None = None
     force: Annotated[bool, Parameter(negative="")] = False
@@ -266,7 +269,7 @@ def _write_models(source: Path, wanted: ModelFiles) -> None:
             if wanted.state_space is not None:
                 write_state_space(model, wanted.state_space, harmonics=harmonics)
             if wanted.fmu is not None:
-                write_fmu(model, wanted.fmu, harmonics=harmonics)
+                write_fmu(model, wanted.fmu, harmonics=harmonics, version=wanted.fmi)
         if wanted.stiffness_table is not None:
             table = stiffness_table(case if of_run is None else of_run, progress=progress)
             write_stiffness_table(table, wanted.stiffness_table)

@@ -1,8 +1,9 @@
-"""A functional mock-up unit of a train: co-simulation by FMI 2.0, in C.
+"""A functional mock-up unit of a train: co-simulation by FMI 2.0 or 3.0, in C.
 
-The unit holds its source, `fmu_model.c` under the data of the train, and the binary of the machine that writes it where
-there is a C compiler. So it needs neither Python nor a library where it runs, and tools that compile sources run it
-anywhere. Modelica Association, Functional Mock-up Interface for Model Exchange and Co-Simulation, 2.0.4, 2022.
+The unit holds its source, `fmu_model.c` under the data of the train and over `fmu_interface_3.c` for FMI 3.0, and the
+binary of the machine that writes it where there is a C compiler. So it needs neither Python nor a library where it
+runs, and tools that compile sources run it anywhere. Modelica Association, Functional Mock-up Interface for Model
+Exchange and Co-Simulation, 2.0.4, 2022; Functional Mock-up Interface, 3.0.2, 2024.
 """
 
 from __future__ import annotations
@@ -19,22 +20,32 @@ from dataclasses import dataclass
 from importlib.resources import files
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from typing import Literal, get_args
 from xml.etree import ElementTree
 
 import numpy as np
 
 import femgear
 from femgear.exchange.dynamic_model import HARMONICS, DynamicModel, MeshTables, check_ending, mesh_tables
+from femgear.errors import CaseError
 from femgear.findings import Finding, tell
 from femgear.storage.files import replaced_file
 
+FmiVersion = Literal[2, 3]
+"""Major versions of FMI that units are written for."""
 IDENTIFIER = "femgear_model"
 """Name of the source and of the binary in the unit."""
 TOLERANCE = 1e-9
 """Relative error of a step of the integration, of the energy of the modes, unless the user sets another one."""
-_BINARIES = {("Linux", "x86_64"): ("linux64", ".so"), ("Windows", "AMD64"): ("win64", ".dll")}
-_BINARIES |= {("Darwin", machine): ("darwin64", ".dylib") for machine in ("x86_64", "arm64")}
-"""Folder and ending of the binary by system and machine, as FMI 2.0 names them."""
+_FOLDERS: dict[tuple[str, str], tuple[str, str]] = {
+    ("Linux", "x86_64"): ("linux64", "x86_64-linux"),
+    ("Linux", "aarch64"): ("", "aarch64-linux"),
+    ("Windows", "AMD64"): ("win64", "x86_64-windows"),
+    ("Darwin", "x86_64"): ("darwin64", "x86_64-darwin"),
+    ("Darwin", "arm64"): ("darwin64", "aarch64-darwin"),
+}
+"""Folder of the binary by system and machine, as FMI 2.0 and 3.0 name them; empty where one has no name."""
+_SUFFIXES = {"Linux": ".so", "Windows": ".dll", "Darwin": ".dylib"}
 _SECONDS = 300
 """Longest that a compiler may take [s]."""
 _EXPONENTS = ("kg", "m", "s", "rad")
@@ -65,19 +76,26 @@ class UnitVariable:
     start: float | None = None
 
 
-def write_fmu(model: DynamicModel, path: Path, *, harmonics: int = HARMONICS) -> None:
+def write_fmu(model: DynamicModel, path: Path, *, harmonics: int = HARMONICS, version: FmiVersion = 2) -> None:
     """Write a train as functional mock-up unit; without a C compiler it holds the source alone (W-COMPILER).
 
-    CaseError: another ending than .fmu (E-CHOICE). StorageError: a file that cannot be written.
+    ``version`` is that of FMI. CaseError (E-CHOICE): another ending than .fmu, another version. StorageError: a file
+    that cannot be written.
     """
     check_ending(path, "--fmu")
+    if version not in get_args(FmiVersion):
+        raise CaseError("units are written for FMI 2 and 3", code="E-CHOICE", key="version", value=version, limit="2, 3")
     variables = list(unit_variables(model))
     data = _data(model, mesh_tables(model, harmonics), variables)
-    code = files("femgear.exchange").joinpath("fmu_model.c").read_text(encoding="utf-8")
+    names = ["fmu_model.c", *(["fmu_interface_3.c"] if version == 3 else [])]
+    code = "\n".join(files("femgear.exchange").joinpath(name).read_text(encoding="utf-8") for name in names)
     guid = str(uuid.uuid5(uuid.NAMESPACE_URL, data + code))
     source = f'#define GUID "{guid}"\n{data}\n{code}'
-    parts: dict[str, str | bytes] = {"modelDescription.xml": _description(model, variables, guid)}
-    parts |= {f"sources/{IDENTIFIER}.c": source, **_compiled(source)}
+    described = _description if version == 2 else _description_3
+    parts: dict[str, str | bytes] = {"modelDescription.xml": described(model, variables, guid)}
+    parts |= {f"sources/{IDENTIFIER}.c": source, **_compiled(source, version)}
+    if version == 3:
+        parts["sources/buildDescription.xml"] = _build_description()
     with replaced_file(path, size=len(source)) as temporary, zipfile.ZipFile(temporary, "w") as unit:
         for place, part in parts.items():
             unit.writestr(place, part, zipfile.ZIP_DEFLATED)
@@ -172,12 +190,7 @@ def _description(model: DynamicModel, variables: list[UnitVariable], guid: str) 
     abilities = {"modelIdentifier": IDENTIFIER, "canHandleVariableCommunicationStepSize": "true"}
     part = ElementTree.SubElement(root, "CoSimulation", abilities | {"canGetAndSetFMUstate": "true"})
     ElementTree.SubElement(ElementTree.SubElement(part, "SourceFiles"), "File", {"name": f"{IDENTIFIER}.c"})
-    units = ElementTree.SubElement(root, "UnitDefinitions")
-    for name, powers in _UNITS.items():
-        exponents = {base: str(power) for base, power in zip(_EXPONENTS, powers, strict=True) if power}
-        ElementTree.SubElement(ElementTree.SubElement(units, "Unit", {"name": name}), "BaseUnit", exponents)
-    period = 1.0 / (model.mesh_rate * model.speed)
-    ElementTree.SubElement(root, "DefaultExperiment", {"stopTime": repr(100 * period), "stepSize": repr(period / 50)})
+    _add_units_and_times(root, model)
     listed = ElementTree.SubElement(root, "ModelVariables")
     for number, variable in enumerate(variables):
         entry = {"name": variable.name, "valueReference": str(number), "causality": variable.causality}
@@ -197,13 +210,62 @@ def _description(model: DynamicModel, variables: list[UnitVariable], guid: str) 
     return ElementTree.tostring(root, encoding="utf-8", xml_declaration=True)
 
 
-def _compiled(source: str) -> dict[str, bytes]:
+def _add_units_and_times(root: ElementTree.Element, model: DynamicModel) -> None:
+    """Add units, and times of a hundred mesh periods, to the description of a unit."""
+    units = ElementTree.SubElement(root, "UnitDefinitions")
+    for name, powers in _UNITS.items():
+        exponents = {base: str(power) for base, power in zip(_EXPONENTS, powers, strict=True) if power}
+        ElementTree.SubElement(ElementTree.SubElement(units, "Unit", {"name": name}), "BaseUnit", exponents)
+    period = 1.0 / (model.mesh_rate * model.speed)
+    ElementTree.SubElement(root, "DefaultExperiment", {"stopTime": repr(100 * period), "stepSize": repr(period / 50)})
+
+
+def _description_3(model: DynamicModel, variables: list[UnitVariable], token: str) -> bytes:
+    """Write modelDescription.xml of a unit for FMI 3.0, whose last variable is the time."""
+    about = {"fmiVersion": "3.0", "modelName": model.title or "gear train", "instantiationToken": token}
+    about |= {"description": model.title, "generationTool": f"femgear {femgear.__version__}"}
+    root = ElementTree.Element("fmiModelDescription", about | {"variableNamingConvention": "flat"})
+    abilities = {"modelIdentifier": IDENTIFIER, "canHandleVariableCommunicationStepSize": "true"}
+    ElementTree.SubElement(root, "CoSimulation", abilities | {"canGetAndSetFMUState": "true"})
+    _add_units_and_times(root, model)
+    listed = ElementTree.SubElement(root, "ModelVariables")
+    for number, variable in enumerate(variables):
+        entry = {"name": variable.name, "valueReference": str(number), "causality": variable.causality}
+        entry |= {"description": variable.description}
+        if variable.causality == "parameter":
+            entry |= {"variability": "fixed", "initial": "exact"}
+        entry |= {"unit": variable.unit} if variable.unit in _UNITS else {}
+        entry |= {} if variable.start is None else {"start": repr(float(variable.start))}
+        ElementTree.SubElement(listed, "Float64", entry)
+    time = {"name": "time", "valueReference": str(len(variables)), "causality": "independent"}
+    ElementTree.SubElement(listed, "Float64", time | {"variability": "continuous", "description": "time [s]"})
+    structure = ElementTree.SubElement(root, "ModelStructure")
+    seen = [str(number) for number, variable in enumerate(variables) if variable.causality == "output"]
+    for kind in ("Output", "InitialUnknown"):
+        for number in seen:
+            ElementTree.SubElement(structure, kind, {"valueReference": number})
+    ElementTree.indent(root)
+    return ElementTree.tostring(root, encoding="utf-8", xml_declaration=True)
+
+
+def _build_description() -> bytes:
+    """Write buildDescription.xml, by which tools compile the source of a unit for FMI 3.0."""
+    root = ElementTree.Element("fmiBuildDescription", {"fmiVersion": "3.0"})
+    build = ElementTree.SubElement(root, "BuildConfiguration", {"modelIdentifier": IDENTIFIER})
+    sources = ElementTree.SubElement(build, "SourceFileSet", {"language": "C99"})
+    ElementTree.SubElement(sources, "SourceFile", {"name": f"{IDENTIFIER}.c"})
+    ElementTree.indent(root)
+    return ElementTree.tostring(root, encoding="utf-8", xml_declaration=True)
+
+
+def _compiled(source: str, version: FmiVersion) -> dict[str, bytes]:
     """Compile the source of a unit: the binary by its place in the unit, nothing where that fails."""
-    folder, suffix = _BINARIES.get((platform.system(), platform.machine()), ("", ""))
+    folder = _FOLDERS.get((platform.system(), platform.machine()), ("", ""))[version - 2]
+    suffix = _SUFFIXES.get(platform.system(), "")
     compiler = next(filter(shutil.which, (os.environ.get("CC", ""), "cc", "gcc", "clang")), None)
     why = ""
     if not folder:
-        why = f"FMI 2.0 names no binaries of {platform.system()} on {platform.machine()}"
+        why = f"FMI {version}.0 names no binaries of {platform.system()} on {platform.machine()}"
     elif compiler is None:
         why = "there is no C compiler (cc, gcc, clang, or what CC names)"
     else:

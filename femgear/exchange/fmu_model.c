@@ -12,6 +12,7 @@
 
 #include <math.h>
 #include <stdarg.h>
+#include <stdbool.h>
 #include <stddef.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -332,6 +333,13 @@ static int observe(State *s) {
   return 1;
 }
 
+/* a new instance at rest */
+static void begin(Instance *instance, const char *name) {
+  if (name) strncpy(instance->name, name, sizeof instance->name - 1);
+  memcpy(instance->state.set, start_values, sizeof instance->state.set);
+  rest(&instance->state);
+}
+
 EXPORT const char *NAME(fmi2GetTypesPlatform)(void) { return "default"; }
 EXPORT const char *NAME(fmi2GetVersion)(void) { return "2.0"; }
 
@@ -348,9 +356,7 @@ EXPORT fmi2Component NAME(fmi2Instantiate)(fmi2String name, fmi2Type type, fmi2S
   instance = (Instance *)calloc(1, sizeof(Instance));
   if (!instance) return NULL;
   if (calls) instance->calls = *calls;
-  if (name) strncpy(instance->name, name, sizeof instance->name - 1);
-  memcpy(instance->state.set, start_values, sizeof instance->state.set);
-  rest(&instance->state);
+  begin(instance, name);
   return instance;
 }
 
@@ -381,8 +387,7 @@ EXPORT fmi2Status NAME(fmi2Terminate)(fmi2Component c) {
 EXPORT fmi2Status NAME(fmi2Reset)(fmi2Component c) {
   Instance *instance = (Instance *)c;
   memset(&instance->state, 0, sizeof instance->state);
-  memcpy(instance->state.set, start_values, sizeof instance->state.set);
-  rest(&instance->state);
+  begin(instance, NULL);
   return fmi2OK;
 }
 

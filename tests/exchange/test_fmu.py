@@ -4,6 +4,7 @@ import shutil
 import subprocess
 import zipfile
 from dataclasses import replace
+from pathlib import Path
 from xml.etree import ElementTree
 
 import numpy as np
@@ -49,11 +50,11 @@ def run(path, model, outputs, *, periods=None, **start):
 
 
 @needs_compiler
-@pytest.mark.parametrize("speed", [150.0, 420.0])
-def test_a_linear_train_moves_as_the_spectral_solver_says(tmp_path, speed):
+@pytest.mark.parametrize(("speed", "version"), [(150.0, 2), (420.0, 2), (150.0, 3)])
+def test_a_linear_train_moves_as_the_spectral_solver_says(tmp_path, speed, version):
     excitation = chain_excitation()
     model, modes = chain_model(excitation), chain_modes(chain_system(), excitation)
-    write_fmu(model, tmp_path / "chain.fmu", harmonics=HARMONICS)
+    write_fmu(model, tmp_path / "chain.fmu", harmonics=HARMONICS, version=version)
     rows = run(tmp_path / "chain.fmu", model, [DEFLECTION, FORCE, "motor_rotation_rate"], speed=speed)
     hertz = [model.mesh_rate * speed]
     response = solve_spectral(modes, excitation, hertz, excitation_harmonics=HARMONICS, response_harmonics=60)
@@ -162,6 +163,49 @@ def test_the_description_is_valid_and_the_source_without_warnings(tmp_path):
     assert said.stderr == ""
     validation = pytest.importorskip("fmpy.validation")
     assert validation.validate_fmu(str(tmp_path / "chain.fmu")) == []
+
+
+@needs_compiler
+def test_a_unit_for_fmi_3_is_valid_and_keeps_its_state(tmp_path):
+    fmpy = pytest.importorskip("fmpy")
+    from fmpy.fmi3 import FMU3Slave
+    from fmpy.validation import validate_fmu
+
+    path = tmp_path / "chain.fmu"
+    write_fmu(chain_model(), path, harmonics=HARMONICS, version=3)
+    assert validate_fmu(str(path)) == []
+    description, folder = fmpy.read_model_description(str(path)), fmpy.extract(str(path), str(tmp_path / "unit"))
+    assert description.fmiVersion == "3.0"
+    names = [variable.name for variable in description.modelVariables]
+    assert names == [*(variable.name for variable in unit_variables(chain_model())), "time"]
+    references = {variable.name: variable.valueReference for variable in description.modelVariables}
+    identity = description.coSimulation.modelIdentifier
+    unit = FMU3Slave(guid=description.guid, unzipDirectory=folder, modelIdentifier=identity, instanceName="chain")
+    assert unit.fmi3GetVersion() == b"3.0"
+    unit.instantiate()
+    unit.enterInitializationMode(startTime=2.0)
+    unit.exitInitializationMode()
+    wanted = [references[name] for name in (FORCE, "motor_rotation", "time")]
+    first, kept, states = unit.getFloat64(wanted), unit.getFMUState(), []
+    assert first[0] == pytest.approx(TORQUE / RADII[0], rel=1e-9) and first[2] == 2.0
+    for _ in range(2):
+        assert unit.doStep(2.0, 1e-3) == (False, False, False, 2.0 + 1e-3)
+        states.append(unit.getFloat64(wanted))
+        unit.setFMUState(kept)
+    unit.freeFMUState(kept)
+    assert states[0] == states[1] != first
+    with pytest.raises(Exception, match="fmi3SetFloat64"):
+        unit.setFloat64([references["tolerance"]], [-1.0])
+    with pytest.raises(Exception, match="fmi3GetInt32"):
+        unit.getInt32([0])
+    unit.terminate()
+    unit.freeInstance()
+    flags = ["-std=c99", "-Wall", "-Wextra", "-Wno-unused-parameter", "-fsyntax-only"]
+    source = Path(folder, "sources", "femgear_model.c")
+    assert subprocess.run(["cc", *flags, source], capture_output=True, text=True, check=True).stderr == ""
+    with pytest.raises(CaseError) as refused:
+        write_fmu(chain_model(), tmp_path / "other.fmu", version=1)
+    assert (refused.value.code, refused.value.value) == ("E-CHOICE", 1)
 
 
 def test_without_a_compiler_the_unit_has_its_source(tmp_path, monkeypatch):
