@@ -17,7 +17,7 @@ from script_tools import Progress, run_script
 
 ROOT = Path(__file__).resolve().parents[1]
 # most bytes, and pixels across, of a picture; its colours
-LARGEST, WIDEST, COLOURS = 110_000, 960, 64
+LARGEST, WIDEST, COLOURS = 110_000, 960, 40
 HEAD = """# Gallery
 
 Pictures of every case and script, with the command that makes them. Made by
