@@ -26,8 +26,8 @@ from xml.etree import ElementTree
 import numpy as np
 
 import femgear
-from femgear.exchange.dynamic_model import HARMONICS, DynamicModel, MeshTables, check_ending, mesh_tables
 from femgear.errors import CaseError
+from femgear.exchange.dynamic_model import HARMONICS, DynamicModel, MeshTables, check_ending, mesh_tables
 from femgear.findings import Finding, tell
 from femgear.storage.files import replaced_file
 
@@ -84,7 +84,9 @@ def write_fmu(model: DynamicModel, path: Path, *, harmonics: int = HARMONICS, ve
     """
     check_ending(path, "--fmu")
     if version not in get_args(FmiVersion):
-        raise CaseError("units are written for FMI 2 and 3", code="E-CHOICE", key="version", value=version, limit="2, 3")
+        raise CaseError(
+            "units are written for FMI 2 and 3", code="E-CHOICE", key="version", value=version, limit="2, 3"
+        )
     variables = list(unit_variables(model))
     data = _data(model, mesh_tables(model, harmonics), variables)
     names = ["fmu_model.c", *(["fmu_interface_3.c"] if version == 3 else [])]
