@@ -133,7 +133,7 @@ def test_a_crack_that_made_a_recording_is_found_with_its_depth(tmp_path, monkeyp
 @pytest.mark.slow
 def test_a_pin_that_stands_wrong_by_20_um_is_found_with_its_size(tmp_path):
     case = with_values(read_case(CASE), COARSE)
-    ranked = rank_causes(case, verdict_of(tmp_path, *computed_lines(True)))
+    ranked = rank_causes(case, verdict_of(tmp_path, *computed_lines("unequal pins")))
     sizes = {entry.cause.name: entry.size for entry in ranked if entry.explained > 0.99}
     # what shares the load so makes the same lines; only the sizes differ
     assert sizes["a planet's pin, along its circle"] == pytest.approx(20 * UM, rel=0.05)

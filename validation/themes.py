@@ -66,6 +66,7 @@ from validation import (
     planar,
     planetary,
     power_flow,
+    recordings,
     rims,
     ring,
     routes,
@@ -373,6 +374,7 @@ THEMES = (
             fault_orders.orders_of_sets,
             fault_orders.orders_of_stages,
             fault_orders.orders_of_pair,
+            recordings.come_back,
         ),
     ),
     Theme(

@@ -28,6 +28,14 @@ _AROUND = 31
 """Least number of bins of which that median is taken."""
 _ORDERS_AROUND = 2.0
 """Orders of which it is taken where they are more."""
+_FAINTEST = -120.0
+"""Level of lines that are no noise [dB]."""
+_REACH = 3
+"""Bins on either side of a line that a Hann window fills, and one more."""
+_BESIDE = 12
+"""Bins without a line of which the noise beside one is taken."""
+_BETWEEN_BINS = 1.08
+"""Error of a line between two bins over that of one on a bin."""
 VERDICTS = (NORMAL, UNEQUAL, "error or fault of the sun", "error or fault of a planet", "not from this gearbox")
 """Words on a line, in the order of concern; a ring makes no new places."""
 
@@ -37,7 +45,8 @@ class MeasuredLine:
     """One line of a measured spectrum.
 
     ``order`` of the carrier, ``amplitude`` (peak) in the unit of the signal, ``level`` [dB] over the strongest line,
-    ``verdict`` one of `VERDICTS`, ``place`` what `classify_lines` says of its place.
+    ``verdict`` one of `VERDICTS`, ``place`` what `classify_lines` says of its place. ``uncertainty`` is by how much
+    the amplitude may be wrong [dB], see `level_uncertainty`.
     """
 
     order: float
@@ -45,6 +54,7 @@ class MeasuredLine:
     level: float
     verdict: str
     place: LineVerdict
+    uncertainty: float
 
 
 def sharpened_lines(spectrum: OrderSpectrum, threshold: float) -> tuple[np.ndarray, np.ndarray]:
@@ -69,8 +79,50 @@ def sharpened_lines(spectrum: OrderSpectrum, threshold: float) -> tuple[np.ndarr
     return spectrum.order[bins] + np.where(right > left, away, -away) * step, height
 
 
+def level_uncertainty(
+    spectrum: OrderSpectrum, order: np.ndarray, height: np.ndarray, *, time_error: float = 0.0, speed: float = 0.0
+) -> np.ndarray:
+    """Compute by how much noise may change the heights of lines, three standard deviations (k,) [dB].
+
+    Of noise with the r.m.s. amplitude n per bin half the power is in phase with a line, so that its height errs by
+    ``n/sqrt(2)`` (the bound of D. C. Rife and R. R. Boorstyn, Single-tone parameter estimation from discrete-time
+    observations, IEEE Trans. Inf. Theory 20 (1974) 591-598), and by up to 1.08 times that for lines between two bins,
+    whose noise a Hann window relates by 2/3. n is that of the bins beside a line that no line reaches. What a wrong
+    angle takes off a line, ``(2 pi f e)^2/2`` of it with the standard error e of the times, comes on top.
+
+    Parameters
+    ----------
+    spectrum : OrderSpectrum
+        Through a Hann window.
+    order, height : (k,) arrays
+        Of its lines, from `sharpened_lines`.
+    time_error : float
+        Standard error of the times of the samples [s].
+    speed : float
+        Of the carrier [1/s].
+    """
+    amplitude, turns = spectrum.amplitude, spectrum.turns
+    every, _ = sharpened_lines(spectrum, _FAINTEST)
+    empty = np.ones(len(amplitude), bool)
+    for reach in range(-_REACH, _REACH + 1):
+        empty[np.clip(np.rint(every * turns).astype(int) + reach, 0, len(empty) - 1)] = False
+    bins = np.flatnonzero(empty)
+    if len(bins) < _BESIDE:
+        return np.full(len(order), np.inf)
+    first = np.clip(np.searchsorted(bins, order * turns) - _BESIDE // 2, 0, len(bins) - _BESIDE)
+    beside = amplitude[bins[first[:, None] + np.arange(_BESIDE)]]
+    noise = np.sqrt((beside**2).mean(axis=1) / 2.0)
+    lost = (2.0 * np.pi * order * speed * time_error) ** 2 / 2.0
+    return 20.0 * np.log10(1.0 + 3.0 * _BETWEEN_BINS * noise / height + lost)
+
+
 def judge_lines(
-    order: np.ndarray, amplitude: np.ndarray, planet_angles, teeth: tuple[int, int | None, int | None], tolerance: float
+    order: np.ndarray,
+    amplitude: np.ndarray,
+    uncertainty: np.ndarray,
+    planet_angles,
+    teeth: tuple[int, int | None, int | None],
+    tolerance: float,
 ) -> tuple[MeasuredLine, ...]:
     """Give every line of a spectrum its verdict, by `femgear.housing.orders.classify_lines`.
 
@@ -78,6 +130,8 @@ def judge_lines(
     ----------
     order, amplitude : (k,) arrays
         Orders of the carrier above zero, and peak amplitudes, of the lines.
+    uncertainty : (k,) array
+        Of these amplitudes [dB].
     planet_angles : (N,) array
         In the frame of the carrier [rad].
     teeth : (ring, sun, planet)
@@ -88,8 +142,10 @@ def judge_lines(
     largest = amplitude.max(initial=0.0)
     lines, orders = [], np.asarray(order, float).tolist()
     places = classify_lines(orders, planet_angles, teeth, tolerance=tolerance)
-    for line_order, height, place in zip(orders, np.asarray(amplitude, float).tolist(), places, strict=True):
-        lines.append(MeasuredLine(line_order, height, 20 * float(np.log10(height / largest)), _words(place), place))
+    heights = np.asarray(amplitude, float).tolist()
+    for line_order, height, place, wrong in zip(orders, heights, places, uncertainty.tolist(), strict=True):
+        level = 20 * float(np.log10(height / largest))
+        lines.append(MeasuredLine(line_order, height, level, _words(place), place, wrong))
     return tuple(lines)
 
 

@@ -33,6 +33,8 @@ _READERS |= dict.fromkeys((".uff", ".unv", ".bunv", ".uf"), read_universal_signa
 
 _OFF = 0.05
 """Distance of the mesh order from where lines stand best, in orders, from which a constant speed is doubted."""
+_FALSE, _HARMONICS_LOOKED_AT = -30.0, 3
+"""Level of false lines over the one beside them that is told [dB], and mesh harmonics up to which it is."""
 _ACCELERATIONS = {"m/s^2": 1.0, "m/s2": 1.0, "mm/s^2": 1e-3, "g": 9.80665, "mg": 9.80665e-3}
 """Accelerations [m/s^2] by their units, in which g is that of free fall (ISO 80000-3)."""
 
@@ -124,7 +126,24 @@ def _pulses(channels: Sequence[Channel], recording: Recording, shafts: HeardSet)
             limit=f"1 or more a turn of {' or '.join(shafts.carrier_per_turn)}",
         )
     turns = turns_of_pulses(pulses, recording.per_turn).of_shaft(ratio)
+    _tell_coarse_pulses(turns, shafts)
     return turns, [channel for channel in channels if channel.name != pulses.name]
+
+
+def _tell_coarse_pulses(turns: Turns, shafts: HeardSet) -> None:
+    """Say from which order on pulses that are known too coarsely make false lines.
+
+    A wave of amplitude a in the times makes lines on both sides of one at the frequency f, ``pi f a`` of it.
+    """
+    frequency = 10 ** (_FALSE / 20) / (np.pi * max(turns.wave, 1e-30))
+    order = frequency / (0.5 * sum(turns.speeds))
+    if order < _HARMONICS_LOOKED_AT * shafts.ring:
+        words = (
+            f"pulses tell the angle to {1e6 * turns.error:.2g} us: from order {order:.0f} on a line may have false ones"
+        )
+        words += f" beside it, within {-_FALSE:g} dB"
+        remedy = "sample the pulses faster, take more of them a turn, or record the sensor instead of a logic level"
+        tell(Finding("W-RATE", "--pulses", words, remedy=remedy))
 
 
 def _carrier_speed(signal: Channel, recording: Recording, shafts: HeardSet) -> float:

@@ -12,7 +12,8 @@ at a third of the rate fs. Orders above that are left out.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import math
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -22,6 +23,8 @@ from femgear.measured.channels import Channel
 _HYSTERESIS = 0.1
 """Share of the height of pulses on either side of the middle that noise may cross."""
 _FEWEST_SMOOTHED = 12
+_STEP_ERROR = 12.0**-0.5
+"""Standard error of an edge that lies anywhere within a sample, in samples."""
 _NEIGHBOURS = 9
 _LONG, _SHORT = 1.5, 0.6
 """Interval of pulses over the median of its neighbours that is a lost pulse, or one too many."""
@@ -36,10 +39,16 @@ LEAST_TURNS = 4
 
 @dataclass(frozen=True)
 class Turns:
-    """The angle of a shaft: at the ``time`` (k,) [s], ascending, it has made so many ``turns`` (k,), ascending too."""
+    """The angle of a shaft: at the ``time`` (k,) [s], ascending, it has made so many ``turns`` (k,), ascending too.
+
+    ``error`` is the standard error of these times [s], ``wave`` the amplitude of the largest wave in it [s], as far as
+    pulses tell them.
+    """
 
     time: np.ndarray
     turns: np.ndarray
+    error: float = 0.0
+    wave: float = 0.0
 
     def times(self, turns: np.ndarray) -> np.ndarray:
         """Find the times (n,) [s] at which the shaft has made so many turns (n,), by a cubic spline."""
@@ -51,7 +60,7 @@ class Turns:
 
     def of_shaft(self, ratio: float) -> Turns:
         """Turns of a shaft that turns ``ratio`` times as fast."""
-        return Turns(self.time, self.turns * abs(ratio))
+        return replace(self, turns=self.turns * abs(ratio))
 
     @property
     def speeds(self) -> tuple[float, float]:
@@ -76,6 +85,8 @@ class AngleSignal:
         Highest order of the shaft that the recording holds at its largest speed.
     speed : float
         Mean speed of the shaft [1/s].
+    time_error : float
+        Standard error of the times of the samples [s], see `Turns`.
     """
 
     name: str
@@ -85,6 +96,7 @@ class AngleSignal:
     per_turn: int
     highest_order: float
     speed: float
+    time_error: float = 0.0
 
 
 def turns_of_pulses(channel: Channel, per_turn: int = 1) -> Turns:
@@ -128,24 +140,42 @@ def turns_of_pulses(channel: Channel, per_turn: int = 1) -> Turns:
             limit=f"{_SHORT:g} to {_LONG:g} times",
             remedy="cut the record there, or mend the channel; the angle is not guessed",
         )
-    time = _unquantised(time, channel.rate)
-    return Turns(time, np.arange(len(time)) / per_turn)
+    steps = (before < levels[0] + margin) & (after > levels[1] - margin)
+    time, error, wave = _unquantised(time, channel.rate, steps=bool(np.median(steps)))
+    return Turns(time, np.arange(len(time)) / per_turn, error, wave)
 
 
-def _unquantised(time: np.ndarray, rate: float) -> np.ndarray:
+def _unquantised(time: np.ndarray, rate: float, *, steps: bool) -> tuple[np.ndarray, float, float]:
     """Smooth times [s] of edges, which lie between two samples and may be known to a step alone.
 
     By the cubic spline whose penalty on curvature is chosen by generalised cross-validation: P. Craven and G. Wahba,
     Smoothing noisy data with spline functions, Numer. Math. 31 (1979) 377-403. It may move no time by more than a step.
+
+    Edges with even and with odd numbers make curves of their own. Where both err alike and independently, the curve of
+    all errs by half of what the two differ by. ``steps`` are edges from one level to the other within a sample: they
+    lie anywhere in it, with a variance of 1/12 of a step, and what the smoothing has not taken away of that is error
+    too. It may be one wave, where the speed hardly changes. Returns the times, their standard error, and the amplitude
+    of the largest wave in that [s].
     """
     from scipy.interpolate import make_smoothing_spline
 
     if len(time) < _FEWEST_SMOOTHED:
-        return time
+        return (time, _STEP_ERROR / rate, math.sqrt(2.0) * _STEP_ERROR / rate) if steps else (time, 0.0, 0.0)
     number = np.arange(len(time), dtype=float)
     even = time[0] + number * (time[-1] - time[0]) / (len(time) - 1)
-    smooth = even + make_smoothing_spline(number, (time - even) * rate)(number) / rate
-    return np.clip(smooth, time - 1.0 / rate, time + 1.0 / rate)
+    late = (time - even) * rate
+    smooth = even + make_smoothing_spline(number, late)(number) / rate
+    smooth = np.clip(smooth, time - 1.0 / rate, time + 1.0 / rate)
+    halves = [make_smoothing_spline(number[i::2], late[i::2])(number) for i in (0, 1)]
+    # the last pulse of either half is extrapolated by the other
+    half_apart = 0.5 * (halves[0] - halves[1])[1:-1] / rate
+    half_apart -= half_apart.mean()
+    waves = np.abs(np.fft.rfft(half_apart * np.hanning(len(half_apart)))) * (4.0 / len(half_apart))
+    error, wave = float(half_apart.std()), float(waves.max())
+    left = (_STEP_ERROR / rate) ** 2 - float(np.var(time - smooth)) if steps else 0.0
+    if left > error**2:
+        error, wave = math.sqrt(left), max(wave, math.sqrt(2.0 * (left - error**2)))
+    return smooth, error, wave
 
 
 def constant_turns(channel: Channel, speed: float) -> Turns:
@@ -198,7 +228,7 @@ def resample_turns(channel: Channel, turns: Turns, *, parts: int = 1) -> AngleSi
     end = channel.start + (len(channel.values) - 1) / channel.rate
     inside = (turns.time >= channel.start) & (turns.time <= end)
     covered = (turns.time[inside][-1] - turns.time[inside][0]) / (end - channel.start) if inside.sum() > 1 else 0.0
-    kept = Turns(turns.time[inside], turns.turns[inside])
+    kept = replace(turns, time=turns.time[inside], turns=turns.turns[inside])
     whole = int(np.floor(kept.turns[-1] - kept.turns[0] + 1e-9)) if covered else 0
     if whole < LEAST_TURNS:
         message, remedy = (
@@ -227,4 +257,5 @@ def resample_turns(channel: Channel, turns: Turns, *, parts: int = 1) -> AngleSi
         raise channel.problem(message, value=f"{slowest * 60:.4g} to {fastest * 60:.4g} rpm", remedy=remedy)
     values = map_coordinates(channel.values, [(times - channel.start) * channel.rate], order=5, mode="mirror")
     highest, mean = _HIGHEST * channel.rate / fastest, whole / (times[-1] - times[0])
-    return AngleSignal(channel.name, channel.unit, values, whole, per_turn, float(highest), float(mean))
+    figures = float(highest), float(mean), turns.error
+    return AngleSignal(channel.name, channel.unit, values, whole, per_turn, *figures)

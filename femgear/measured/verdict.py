@@ -21,6 +21,7 @@ from femgear.measured.lines import (
     MeasuredLine,
     chance,
     judge_lines,
+    level_uncertainty,
     order_tolerance,
     sharpened_lines,
 )
@@ -89,7 +90,9 @@ def measured_verdict(
     signal = read_by_turns(path, recording, gear_set)
     tolerance = order_tolerance(signal.turns, search.tolerance)
     spectrum = windowed_spectrum(signal)
-    lines = judge_lines(*sharpened_lines(spectrum, search.threshold), gear_set.angles, gear_set.teeth, tolerance)
+    order, height = sharpened_lines(spectrum, search.threshold)
+    wrong = level_uncertainty(spectrum, order, height, time_error=signal.time_error, speed=signal.speed)
+    lines = judge_lines(order, height, wrong, gear_set.angles, gear_set.teeth, tolerance)
     return MeasuredVerdict(gear_set, signal, spectrum, lines, tolerance)
 
 
@@ -162,12 +165,14 @@ def describe_verdict(verdict: MeasuredVerdict, search: LineSearch) -> Iterator[B
     )
     yield Block("Recording", rows=rows)
     strongest = sorted(sorted(verdict.lines, key=lambda line: -line.level)[:_SHOWN], key=lambda line: line.order)
-    table = tuple((f"{line.order:.2f}", f"{line.level:.1f}", line.verdict, line.place.reason) for line in strongest)
+    table = tuple(
+        (f"{line.order:.2f}", f"{line.level:.1f}", f"{line.uncertainty:.2g}", line.verdict, line.place.reason)
+        for line in strongest
+    )
     title = f"{len(verdict.lines)} lines above {search.threshold:g} dB, out of the noise"
     title += f", the strongest {_SHOWN}" if len(verdict.lines) > _SHOWN else ""
-    yield Block(
-        title, ("carrier order", "level [dB]", "verdict", "why") if table else (), table, tuple(_notes(verdict))
-    )
+    heading = ("carrier order", "level [dB]", "± [dB]", "verdict", "why")
+    yield Block(title, heading if table else (), table, tuple(_notes(verdict)))
 
 
 def _notes(verdict: MeasuredVerdict) -> Iterator[str]:
@@ -184,13 +189,25 @@ def _notes(verdict: MeasuredVerdict) -> Iterator[str]:
     yield f"an order without meaning fits turns of sun or planet by chance in {likely:.0%} of cases at most"
 
 
+def _words_on_place(line: MeasuredLine) -> tuple[object, ...]:
+    return line.place.nearest, line.place.factor, line.verdict, line.place.reason
+
+
 def _write(verdict: MeasuredVerdict, search: LineSearch, folder: Path) -> None:
     """Write lines, spectrum and figure."""
     unit = f" [{verdict.signal.unit}]" if verdict.signal.unit else ""
-    header = ("order", f"amplitude{unit}", "level [dB]", "whole order", "array factor", "verdict", "why")
+    header = (
+        "order",
+        f"amplitude{unit}",
+        "level [dB]",
+        "uncertainty [dB]",
+        "whole order",
+        "array factor",
+        "verdict",
+        "why",
+    )
     rows = (
-        (line.order, line.amplitude, line.level, line.place.nearest, line.place.factor, line.verdict, line.place.reason)
-        for line in verdict.lines
+        (line.order, line.amplitude, line.level, line.uncertainty, *_words_on_place(line)) for line in verdict.lines
     )
     write_csv(folder / _LINES, header, rows)
     spectrum = zip(verdict.spectrum.order.tolist(), verdict.spectrum.amplitude.tolist())

@@ -4,9 +4,8 @@ import re
 
 import numpy as np
 import pytest
-import pyuff
 from recorded_signals import HEALTHY, RATE, recording, write_columns
-from scipy.io import savemat, wavfile
+from scipy.io import wavfile
 
 from femgear.errors import CaseError
 from femgear.measured.heard_set import HeardSet
@@ -14,28 +13,14 @@ from femgear.measured.lines import sharpened_lines
 from femgear.measured.recordings import read_by_turns, read_channels
 from femgear.measured.requests import Recording
 from femgear.measured.spectra import windowed_spectrum
+from validation.recordings import written as write_recording
 
 HEARD = HeardSet(108, 27, 40, np.radians([0, 120, 240]), "sun", {"sun": 0.2, "carrier": 1.0})
 SIGNAL, PULSES, TURNS = recording(HEALTHY, HEALTHY.values(), seconds=4.0)
 
 
 def written(folder, kind):
-    if kind == "csv":
-        columns = np.arange(len(SIGNAL)) / RATE, SIGNAL, PULSES
-        return write_columns(folder / "a.csv", "time [s];acc [m/s^2];tacho [V]\n", columns)
-    if kind == "wav":
-        wavfile.write(folder / "a.wav", int(RATE), np.stack([SIGNAL, PULSES], 1).astype(np.float32))
-        return folder / "a.wav"
-    if kind == "uff":
-        for name, values in (("acc", SIGNAL), ("tacho", PULSES)):
-            scalar = {"rsp_node": 1, "rsp_dir": 3, "ref_dir": 0, "ref_node": 0, "z_axis_value": 0.0, "binary": 1}
-            scalar |= {f"{part}_spec_data_type": 0 for part in ("orddenom", "z_axis", "ordinate")}
-            data = {"func_type": 1, "data": values, "x": np.arange(len(values)) / RATE, "id1": name}
-            times = {"abscissa_spacing": 1, "abscissa_spec_data_type": 17}
-            pyuff.UFF(str(folder / "a.uff")).write_sets(pyuff.prepare_58(**data, **scalar, **times), mode="add")
-        return folder / "a.uff"
-    savemat(folder / "a.MAT", {"acc": SIGNAL, "tacho": PULSES, "fs": RATE})
-    return folder / "a.MAT"
+    return write_recording(folder, kind, SIGNAL, PULSES, RATE)
 
 
 @pytest.mark.parametrize("kind", ["csv", "wav", "mat", "uff"])
@@ -94,6 +79,21 @@ def test_a_range_that_is_advised_is_allowed(carrier, tmp_path, recwarn):
         read_by_turns(path, Recording(speed="900 rpm", within=float(advised[1])), HEARD)
     assert bool(advised) == (carrier == 3.006)
     assert advised or "record pulses of a turn" in text
+
+
+def test_pulses_of_few_samples_tell_from_which_order_on_they_make_false_lines(tmp_path, recwarn):
+    """At a speed that hardly changes a step of the samples is a slow wave in the times of the pulses."""
+    signal, pulses, _ = recording(HEALTHY, HEALTHY.values(), rate=3000.0, wander=3e-4, noise=1e-4)
+    path = write_recording(tmp_path, "wav", signal, pulses, 3000.0)
+    spectrum = windowed_spectrum(read_by_turns(path, Recording(channel="1", pulses="2"), HEARD))
+    (text,) = (str(warning.message) for warning in recwarn)
+    assert "W-RATE" in text and "pulses tell the angle to" in text
+    from_order = float(re.search(r"from order (\d+) on", text)[1])
+    order, height = sharpened_lines(spectrum, -30.0)
+    false = np.array([np.abs(np.array(list(HEALTHY)) - at).min() > 0.05 for at in order])
+    # they are there, above the order and below the size that is told
+    assert false.any() and order[false].min() > from_order
+    assert height[false].max() < 10 ** (-30.0 / 20) * order[false].max() / from_order
 
 
 def test_accelerations_come_in_si_units(tmp_path):
