@@ -17,7 +17,7 @@ pytestmark = pytest.mark.usefixtures("coarse_states")
 SLOPE = {"kind": "lead slope", "amount": "10 um"}
 FEW = {"static.flank_elements": 6, "static.stresses": False}
 SPUR = {"sun.modifications": [SLOPE], "static.slices": 9, "static.positions": 16}
-HELICAL = {"static.slices": 9, "static.positions": 24, "static.flank_elements": 4}
+HELICAL = {"static.slices": 9, "static.positions": 8, "static.flank_elements": 4}
 
 
 @pytest.mark.parametrize(
