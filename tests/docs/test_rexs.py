@@ -4,9 +4,12 @@ import re
 import tomllib
 from pathlib import Path
 
+import pytest
 from rexs_stage import Gearbox, ParallelUnit
 
 from femgear import cli
+
+pytestmark = pytest.mark.usefixtures("coarse_states")
 
 DOCS = Path(__file__).parents[2] / "docs"
 

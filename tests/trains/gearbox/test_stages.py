@@ -18,7 +18,7 @@ from femgear.trains.live import Answer, Live
 from femgear.trains.reading import open_results, parse_case, read_case
 from femgear.trains.registry import stages_of, train_of
 
-pytestmark = pytest.mark.usefixtures("pictures_undrawn")
+pytestmark = pytest.mark.usefixtures("pictures_undrawn", "coarse_states")
 
 
 @pytest.fixture(scope="module")
