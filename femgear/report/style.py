@@ -104,6 +104,22 @@ def label(ax, x: str = "", y: str = "", title: str = "") -> None:
         ax.set_title(title, fontsize=SIZE, loc="left")
 
 
+def draw_at_right(ax, x: np.ndarray, words: str, values: np.ndarray, *, colour: str = BLUE, dash: str = "-") -> None:
+    """Draw values (n,) over places (n,) behind the curves of axes, with an ordinate of these words at the right."""
+    right, finite = ax.twinx(), values[np.isfinite(values)]
+    right.plot(x, np.where(np.isfinite(values), values, np.nan), dash, color=colour, linewidth=1.4)
+    if len(finite):
+        low, high = finite.min(), finite.max()
+        # room above for names, and a step of ten at least
+        right.set_ylim(low - 2.0, low + 1.45 * max(high - low, 10.0))
+    right.grid(False)
+    right.spines["top"].set_visible(False)
+    right.tick_params(labelsize=SIZE - 1, colors=colour)
+    right.set_ylabel(words, fontsize=SIZE, color=colour)
+    ax.set_zorder(right.get_zorder() + 1)
+    ax.patch.set_visible(False)
+
+
 def legend_below(figure: Figure, ax=None, *, columns: int = 3) -> None:
     """Add one legend under the figure, where it hides nothing; entries of equal text appear once.
 

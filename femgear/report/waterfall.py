@@ -22,6 +22,7 @@ from femgear.report.style import (
     SMALL,
     VERMILION,
     Drawings,
+    draw_at_right,
     label,
     legend_below,
     name_curves,
@@ -255,10 +256,7 @@ def runup_levels(
     if short.any():
         words += f"\ndotted: {_ends_short(runup)}"
     if weighted is not None:
-        _draw_weighted(axes[0].twinx(), speed, *weighted)
-        # names of resonances stand over it
-        axes[0].set_zorder(1)
-        axes[0].patch.set_visible(False)
+        draw_at_right(axes[0], speed, *weighted)
     label(axes[0], y="level, r.m.s. [m/s²]", title=words)
     _name_resonances(axes[0], runup)
     operating = np.atleast_1d(runup.attrs["operating_speeds"])
@@ -278,20 +276,6 @@ def runup_levels(
     label(axes[1], y="mesh force, r.m.s.\nabout its mean [N]")
     label(axes[2], "speed of the input [rpm]", "dynamic factor K_v [1]")
     return figure
-
-
-def _draw_weighted(ax, speed: np.ndarray, words: str, level: np.ndarray) -> None:
-    """Draw a level (speeds,) [dB(A)] with an ordinate at the right."""
-    audible = level[np.isfinite(level)]
-    ax.plot(speed, np.where(np.isfinite(level), level, np.nan), color=BLUE, linewidth=1.4)
-    if len(audible):
-        low, high = audible.min(), audible.max()
-        # as much room for the names of resonances as on the left
-        ax.set_ylim(low - 2.0, low + 1.45 * max(high - low, 10.0))
-    ax.grid(False)
-    ax.spines["top"].set_visible(False)
-    ax.tick_params(labelsize=SIZE - 1, colors=BLUE)
-    ax.set_ylabel(words, fontsize=SIZE, color=BLUE)
 
 
 def _short(runup: xr.Dataset) -> np.ndarray:

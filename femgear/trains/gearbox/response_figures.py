@@ -8,7 +8,19 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from femgear.case.level_limits import limit_at
-from femgear.report.style import BLACK, COLOURS, DASHES, GREY, SMALL, label, legend_below, new_figure, rpm, stems
+from femgear.report.style import (
+    BLACK,
+    COLOURS,
+    DASHES,
+    GREY,
+    SMALL,
+    draw_at_right,
+    label,
+    legend_below,
+    new_figure,
+    rpm,
+    stems,
+)
 from femgear.stages.protocol import Drawn, Figures
 from femgear.trains.gearbox.stage_figures import draw_stage_forces, end_with_speeds
 
@@ -107,6 +119,9 @@ def draw_run_up_levels(
             ax.set_ylim(min(low, 0.7 * limit.min()), max(high, 1.5 * limit.max()))
         _plain_ticks(ax)
         _mark_operation(ax, runup, operation)
+        if "weighted_level" in runup:
+            weighted, words_at_right = runup["weighted_level"].values[:, sensor], "A-weighted\n[dB(A) re 1 µm/s²]"
+            draw_at_right(ax, speed, words_at_right, weighted, colour=GREY, dash="--")
         label(ax, y="level, r.m.s. [m/s²]", title=f"sensor {runup['sensor'].values[sensor]}")
     label(axes[-1], f"speed of {runup.attrs['reference']} [rpm]")
     if words:
@@ -239,7 +254,10 @@ RESPONSE_FIGURES = {
     ),
     "runup": Figures(
         {
-            "run_up_levels": "Level at the sensors over the speed, and the part that each stage makes of it.",
+            "run_up_levels": (
+                "Level at the sensors over the speed, and the part that each stage makes of it. Grey, at the right: "
+                "the level with lines weighted as the ear does."
+            ),
             "run_up_forces": "Largest mesh force over its mean over the speed, by stage; of planetary stages with "
             "the sun and with the ring.",
             "stage_forces": "Dynamic force of the first mesh of every stage over the speed, by the stage that excites.",

@@ -11,6 +11,7 @@ import numpy as np
 
 from femgear.case.quantities import RPM
 from femgear.findings import Finding
+from femgear.housing.sound import REFERENCE_ACCELERATION, a_weighting
 from femgear.report.tables import Block, in_decibels, tabulate
 from femgear.stages.protocol import StageResult
 from femgear.storage.contents import Contents
@@ -141,6 +142,7 @@ def _at_sensors(response: GearboxResponse, moved: dict[str, np.ndarray]) -> dict
     return {
         "level": ("speed sensor", level(response, moved), "m/s^2", "root mean square of the acceleration"),
         "level_of_stage": ("speed sensor stage", by_stage, "m/s^2", "the same by the lines of one stage"),
+        "weighted_level": ("speed sensor", _weighted_level(response, moved), "dB", "A-weighted level re 1 um/s^2"),
         "outer_level": (
             "speed sensor stage",
             _outer_levels(response, moved),
@@ -150,6 +152,16 @@ def _at_sensors(response: GearboxResponse, moved: dict[str, np.ndarray]) -> dict
         **_of_paths(response, moved),
         **_complex("lines", "speed sensor line", lines, "m/s^2", "acceleration, amplitude of the line"),
     }
+
+
+def _weighted_level(response: GearboxResponse, moved: dict[str, np.ndarray]) -> np.ndarray:
+    """A-weighted levels (v, s) of the acceleration at the sensors [dB re 1 um/s^2]."""
+    as_the_ear = {
+        stage.name: moved[stage.name] * a_weighting(stage.order * response.speed[:, None] / (2.0 * np.pi))[:, None]
+        for stage in response.stages
+    }
+    with np.errstate(divide="ignore"):
+        return 20.0 * np.log10(level(response, as_the_ear) / REFERENCE_ACCELERATION)
 
 
 def _outer_levels(response: GearboxResponse, moved: dict[str, np.ndarray]) -> np.ndarray:

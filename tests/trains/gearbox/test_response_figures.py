@@ -56,6 +56,16 @@ def response_data(*, speeds=5, sensors=2) -> xr.Dataset:
     )
 
 
+def test_weighted_levels_have_an_ordinate_at_the_right():
+    data = response_data(sensors=1)
+    weighted = np.array([60.0, 70.0, -np.inf, 80.0, 75.0])
+    data["weighted_level"] = ("speed", "sensor"), weighted[:, None]
+    left, right = draw_run_up_levels(data, 2000.0).axes
+    curve = right.lines[0].get_ydata()
+    assert curve[[0, 1, 3, 4]] == pytest.approx([60.0, 70.0, 80.0, 75.0]) and np.isnan(curve[2])
+    assert "dB(A)" in right.get_ylabel() and left.get_zorder() > right.get_zorder()
+
+
 def curves_of(ax) -> dict[str, np.ndarray]:
     return {line.get_label(): line.get_ydata() for line in ax.lines if not line.get_label().startswith("_")}
 

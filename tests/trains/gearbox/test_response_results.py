@@ -7,6 +7,7 @@ import pytest
 import xarray as xr
 from casings import RPM, pair_in_a_casing, response
 
+from femgear.housing.sound import a_weighting
 from femgear.trains.gearbox.response import solve_gearbox_response
 from femgear.trains.gearbox.response_results import (
     GearboxResponseResult,
@@ -44,6 +45,9 @@ def test_the_file_has_levels_lines_and_forces(data):
     lines = np.hypot(data["lines_real"], data["lines_imag"]).values
     assert data["level"].values == pytest.approx(np.sqrt(0.5 * (lines**2).sum(axis=2)))
     assert data["level_of_stage"].values[..., 0] == pytest.approx(data["level"].values)
+    hertz = data["order"].values * data["speed"].values[:, None] / 60.0
+    power = 0.5 * ((lines * a_weighting(hertz)[:, None]) ** 2).sum(axis=2)
+    assert data["weighted_level"].values == pytest.approx(10.0 * np.log10(power) + 120.0, abs=1e-6)
     force = np.hypot(data["bearing_force_real"], data["bearing_force_imag"]).values
     assert data["bearing_force_rms"].values == pytest.approx(np.sqrt(0.5 * (force**2).sum(axis=3)))
     assert all(array.attrs["units"] for array in data.data_vars.values())
