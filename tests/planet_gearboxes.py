@@ -370,3 +370,13 @@ def bending_set(angle: float, *, back: bool):
         "deflection": {"slices": 1},
         "casing": casing_tables(),
     }
+
+
+def parting_set(make, *, fixed="ring", torque=4.0, motions="plane"):
+    """Loaded state of `simple_set` or `known_set` in a casing, near a resonance at which its teeth part."""
+    mesh = COUNTED | {"backlash": "20 um", "low_share": 0.5}
+    tables = make(teeth=(28, 38, 104), mesh=mesh, motions=motions, torque=torque)
+    tables["operation"] |= {"fixed": [fixed], "output": ["carrier" if fixed != "carrier" else "ring"]}
+    tables["operation"]["load_case"][0]["speed"] = {"sun": "6000 rpm"}
+    tables |= {"balance": {"harmonics": 4, "side_bands": 1}, "modes": {"damping_ratio": 0.006}}
+    return solve_deflection(read_case(in_casing(tables)))

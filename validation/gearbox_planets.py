@@ -18,6 +18,7 @@ from planet_gearboxes import (
     lines_apart,
     outer_lines,
     pair_conditions,
+    parting_set,
     places_by_trial,
     planet_shaft,
     random_set,
@@ -31,6 +32,7 @@ from scipy.linalg import eigh
 
 from femgear.gears.planet_assembly import assembly_step
 from femgear.gears.power_flow import power_flow
+from femgear.trains.gearbox.balance import solve_balance
 from femgear.trains.gearbox.deflection import Deflection, solve_deflection
 from femgear.trains.gearbox.modes import solve_gearbox_modes
 from femgear.trains.reading import read_case
@@ -110,6 +112,21 @@ def simple_planets() -> list[Row]:
         )
         text = "lines of sensors, bearings and feet in a casing on uneven feet, k(t) of 30 %, over the largest of each"
         rows.append(at_most(f"28/38/104, {fixed} stands, {torque:g} N m", STAGE, text, 1e-9, lines_apart(own, known)))
+    return rows
+
+
+def parting_planets() -> list[Row]:
+    """Teeth that part by harmonic balance, planets as shafts against those of a planetary stage."""
+    rows = []
+    for fixed, torque in (("ring", 4.0), ("ring", -4.0), ("carrier", 4.0)):
+        ((shafts,), (stage,)) = (
+            solve_balance(parting_set(make, fixed=fixed, torque=torque)) for make in (simple_set, known_set)
+        )
+        forces = np.abs(shafts.drive - stage.drive).max() / stage.drive.max()
+        heard = np.abs(shafts.acceleration - stage.acceleration).max() / np.abs(stage.acceleration).max()
+        case, apart = f"28/38/104, {fixed} stands, {torque:g} N m", f"The least force is {stage.drive.min():.3g} N."
+        for text, away in (("forces of drive flanks", forces), ("lines of sensors", heard)):
+            rows.append(at_most(case, STAGE, f"harmonic balance: {text}, over the largest", 1e-9, away, note=apart))
     return rows
 
 

@@ -143,6 +143,7 @@ THEMES = (
             gearbox_planets.places,
             gearbox_planets.kinematics,
             gearbox_planets.simple_planets,
+            gearbox_planets.parting_planets,
             gearbox_planets.stepped_planets,
             gearbox_planets.planet_errors,
             gearbox_planets.symmetric_lines,

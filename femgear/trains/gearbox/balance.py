@@ -3,14 +3,15 @@
 Stage by stage, as the response is solved: flanks of one stage part, and touch their back flanks, while meshes of all
 others are springs about the loaded state (`femgear.trains.gearbox.nonlinear`). With ``together`` flanks of all stages
 part and all carriers turn, while the stiffness of the one stage fluctuates. A pair has the mesh frequency alone, a
-set whose carrier turns that of the carrier too, by which weight and uneven supports act on its planets. Bearings with
-play that are given by their stiffness keep it.
+set whose carrier turns that of the carrier too, by which weight and uneven supports act on its planets. Of planets that
+are shafts all meshes of one frequency excite at once; those of another one go round with them at their mean stiffness,
+and part too. Bearings with play that are given by their stiffness keep it.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import product
 from typing import TYPE_CHECKING, Any
@@ -20,22 +21,26 @@ import numpy as np
 from femgear.case.dependencies import Steps
 from femgear.errors import CaseError, several
 from femgear.findings import Finding
-from femgear.report.tables import Block, tabulate
+from femgear.report.tables import Block, merged_names, tabulate
 from femgear.solvers.periodic.harmonic_balance import displacements, solve_harmonic_balance
 from femgear.solvers.periodic.solution import PeriodicSolution
 from femgear.stages.protocol import Progress, StageResult, silent
 from femgear.storage.contents import Contents
 from femgear.system.force_laws import Element, GearMeshes, positive_part
 from femgear.system.fourier import harmonic_lines, side_bands
-from femgear.system.system import NonlinearSystem
+from femgear.system.system import MeshExcitation, NonlinearSystem
 from femgear.system.turning_meshes import TurningMeshes, planet_wave_generator
 from femgear.trains.gearbox.case_file import CASING, BoxBalanceSection, GearboxCase, PairSection
 from femgear.trains.gearbox.deflection import Deflection
 from femgear.trains.gearbox.excitation import constant_excitation, excitation_of, exciting_stages
 from femgear.trains.gearbox.geometry import set_sizes
+from femgear.trains.gearbox.model import StageModel
 from femgear.trains.gearbox.nonlinear import NonlinearGearbox, nonlinear_gearbox
+from femgear.trains.gearbox.planet_branches import running_sets
+from femgear.trains.gearbox.planet_shafts import unlike_planets
 from femgear.trains.gearbox.play import loose_notes
 from femgear.trains.gearbox.power import gearbox_flow
+from femgear.trains.gearbox.running_branches import kinds_together
 from femgear.trains.gearbox.sensors import sensor_rows
 from femgear.trains.gearbox.silence import exciting_sections, weighed_sections
 
@@ -127,30 +132,64 @@ def solve_balance(state: Deflection, *, steps: Steps | None = None, progress: Pr
     wanted, solved = state.model.case.balance, list[StageBalance]()
     weighed = [stage.name for stage in weighed_sections(state.model.case)]
     stages = [stage for stage in state.model.stages if stage.name in weighed] or exciting_stages(state)
-    for number, stage in enumerate(stages):
-        progress("balance", number, len(stages))
-        rubs = isinstance(stage.section, PairSection)
-        if weighed:
-            drive = constant_excitation(state, stage)
-        else:
-            drive = excitation_of(state, stage, steps=steps, friction=rubs)
-        if drive.source is not None:
-            # friction acts about its mean, which the torques of the gearbox do not know
-            mean = state.contacts[stage.name].normal_force[:, None]
-            drive = replace(drive, force=drive.force - drive.force.mean(axis=1, keepdims=True) + mean)
-        drives = {stage.name: drive}
-        if wanted.together:
-            others = (member for member in state.model.stages if member is not stage)
-            drives |= {other.name: constant_excitation(state, other, steps=steps) for other in others}
+    sets = _at_once(state, stages)
+    for number, names in enumerate(sets):
+        progress("balance", number, len(sets))
+        exciting = [stage for stage in stages if stage.name in names]
+        drives = {stage.name: _drive(state, stage, weighed=bool(weighed), steps=steps) for stage in exciting}
+        beside = _around_with(state, names)
+        for stage in state.model.stages:
+            if stage.name not in drives and (wanted.together or stage.name in beside):
+                drives[stage.name] = constant_excitation(state, stage, steps=steps)
         options: dict[str, Any] = {"harmonics": wanted.harmonics, "back_flanks": wanted.back_flanks}
-        box = nonlinear_gearbox(state, drives, **options)
-        names = [stage.name for stage in box.stages]
-        solution = _solved(box, wanted, names.index(stage.name))
-        solved.append(_moving(box, solution, names.index(stage.name)))
+        together = [group for group in (names, beside) if len(group) > 1]
+        box = nonlinear_gearbox(state, drives, **options, together=together)
+        moving = [stage.name for stage in box.stages]
+        place = moving.index(merged_names(names))
+        solution = _solved(box, wanted, place)
+        solved.append(_moving(box, solution, place))
         if not number:
-            silent_stages = [member for member in names if member not in {exciting.name for exciting in stages}]
-            solved += [_moving(box, solution, names.index(member), excites=False) for member in silent_stages]
+            excited = {merged_names(group) for group in sets} | {merged_names(beside)}
+            silent_stages = [name for name in moving if name not in excited]
+            solved += [_moving(box, solution, moving.index(name), excites=False) for name in silent_stages]
     return solved
+
+
+def _drive(state: Deflection, stage: StageModel, *, weighed: bool, steps: Steps | None) -> MeshExcitation:
+    """What a stage excites with; friction of pairs whose directions stand still is in it."""
+    if weighed:
+        return constant_excitation(state, stage)
+    carrier = stage.section.carrier
+    turns = carrier is not None and carrier != CASING and state.model.flow.speed[carrier] != 0.0
+    rubs = isinstance(stage.section, PairSection) and not turns
+    drive = excitation_of(state, stage, steps=steps, friction=rubs)
+    if drive.source is None:
+        return drive
+    # friction acts about its mean, which the torques of the gearbox do not know
+    mean = state.contacts[stage.name].normal_force[:, None]
+    return replace(drive, force=drive.force - drive.force.mean(axis=1, keepdims=True) + mean)
+
+
+def _at_once(state: Deflection, stages: Sequence[StageModel]) -> list[tuple[str, ...]]:
+    """Names of the stages that excite at once: one, or all meshes of one frequency among branches of planets."""
+    left, sets = [stage.name for stage in stages], list[tuple[str, ...]]()
+    for running in running_sets(state.model.case):
+        for kind, names in enumerate(running.kinds):
+            if not {*left}.isdisjoint(names):
+                alike = kinds_together(state.model, running, kind)
+                at_once = {name for number in alike for name in running.kinds[number]}
+                sets.append(tuple(name for name in left if name in at_once))
+                left = [name for name in left if name not in at_once]
+    return [*sets, *((name,) for name in left)]
+
+
+def _around_with(state: Deflection, names: Sequence[str]) -> tuple[str, ...]:
+    """Names of the other meshes of branches of planets, which go round with those of these names."""
+    for running in running_sets(state.model.case):
+        every = {name for kind in running.kinds for name in kind}
+        if not every.isdisjoint(names):
+            return tuple(stage.name for stage in state.model.stages if stage.name in every.difference(names))
+    return ()
 
 
 def _moving(box: NonlinearGearbox, solution: PeriodicSolution, place: int, *, excites: bool = True) -> StageBalance:
@@ -188,7 +227,7 @@ def lines_together(box: NonlinearGearbox, place: int, harmonics: int, side_bands
 
     The mean comes first; of a line and its conjugate one is listed.
     """
-    turning = [stage.turn_base for stage in box.stages if stage.turns]
+    turning = [*dict.fromkeys(stage.turn_base for stage in box.stages if stage.turns)]
     highest = np.zeros(len(box.frequency), int)
     highest[turning], highest[box.stages[place].mesh_base] = side_bands, harmonics
     ranges = [range(-top, top + 1) for top in highest.tolist()]
@@ -224,23 +263,31 @@ def loaded_lines(box: NonlinearGearbox, count: int) -> np.ndarray:
 
 
 def check_balance(case: GearboxCase) -> None:
-    """Refuse planets that are not equally spaced, or two, on a carrier that turns.
+    """Refuse planets that are not equally spaced, or two, on a carrier that turns, and unlike ones that are shafts.
 
-    CaseError: one for every such stage that excites the gearbox (E-TURNING).
+    CaseError: one for every such set that excites the gearbox (E-TURNING).
     """
     flow, problems = gearbox_flow(case), list[CaseError]()
     exciting = (weighed_sections(case) or exciting_sections(case)) if case.balance.harmonics else ()
-    for stage in case.planetary if exciting and case.balance.together else exciting:
-        if isinstance(stage, PairSection) or not flow.carries(stage):
-            continue
-        if stage.carrier == CASING or not flow.speed[stage.carrier]:
-            continue
+    around = [
+        (f"planetary[{case.planetary.index(stage)}]", set_sizes(stage).planet_angles)
+        for stage in (case.planetary if exciting and case.balance.together else exciting)
+        if not isinstance(stage, PairSection) and flow.carries(stage)
+        if stage.carrier != CASING and flow.speed[stage.carrier]
+    ]
+    if any(isinstance(stage, PairSection) for stage in exciting):
+        remedy = "make them equal, or leave balance out: the response has such planets"
+        problems += unlike_planets(case, flow, "balance.harmonics", remedy)
+        turning = [running for running in running_sets(case) if flow.speed[running.branches[0].carrier]]
+        around += [("balance.harmonics", running.angles) for running in turning]
+    for key, angles in around:
         try:
-            planet_wave_generator(set_sizes(stage).planet_angles)
+            planet_wave_generator(angles)
         except CaseError as error:
-            error.key = f"planetary[{case.planetary.index(stage)}]"
-            error.file = case.location(error.key)
+            error.key = key
             problems.append(error)
+    for problem in problems:
+        problem.file = problem.file or case.location(problem.key or "")
     if problems:
         raise several(problems)
 
@@ -287,7 +334,8 @@ def _deflections(
 ) -> Iterator[tuple[np.ndarray, np.ndarray]]:
     """Deflections (I, n_columns) [m] and phases (I, n_bases) [rad] at one angle of the carrier after the other."""
     stage_of_place, turns = box.stages[place], np.zeros((1, len(box.frequency)))
-    others = [stage.turn_base for stage in box.stages if stage.turns and stage is not stage_of_place]
+    turning = [stage.turn_base for stage in box.stages if stage.turns]
+    others = [*dict.fromkeys(turning_base for turning_base in turning if turning_base != stage_of_place.turn_base)]
     if stage_of_place.turns or others:
         angles = np.arange(_TURNS * (_ANGLES if others else 1))
         turns = np.zeros((len(angles), len(box.frequency)))

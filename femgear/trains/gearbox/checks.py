@@ -38,7 +38,7 @@ from femgear.trains.gearbox.holding import floating_shafts, loose_fits, tilting_
 from femgear.trains.gearbox.materials import material_notices
 from femgear.trains.gearbox.planet_branches import misplaced_branches
 from femgear.trains.gearbox.planet_errors import planet_error_problems
-from femgear.trains.gearbox.planet_shafts import branches_in_balance, carrier_entries, unclosed_chains
+from femgear.trains.gearbox.planet_shafts import carrier_entries, unclosed_chains
 from femgear.trains.gearbox.power import gearbox_flow
 from femgear.trains.gearbox.tooth_life import pitting_problems
 from femgear.trains.gearbox.transient_case import transient_problems
@@ -60,7 +60,7 @@ def check_gearbox_entries(case: GearboxCase) -> list[CaseError]:
     stages, loads = [*_stages(case)], [*_loads(case)]
     problems = [*named, *_seats(case), *_bearings(case), *_shaft_parts(case), *stages, *loads, *_weight(case)]
     problems += [*coupling_problems(case), *run_up_problems(case)]
-    problems += [*transient_problems(case.transient, port_names(case)), *branches_in_balance(case)]
+    problems += transient_problems(case.transient, port_names(case))
     problems += [] if named else [*planet_error_problems(case)]
     problems += [] if named else check_casing(case)
     problems += [] if stages else pitting_problems(case, (*case.pair, *case.planetary))

@@ -54,7 +54,7 @@ def gearbox_dynamic_model(case: GearboxCase, results: Mapping[str, Any]) -> Dyna
     """
     state: Deflection = results["deflection"].of(case).state
     model, excitations = state.model, all_excitations(state)
-    options = {"separates": False, "back_flanks": False, "gyroscopic": False, "turning": False}
+    options: dict[str, Any] = {"separates": False, "back_flanks": False, "gyroscopic": False, "turning": False}
     box = nonlinear_gearbox(state, excitations, harmonics=1, **options)
     if box.bearings:
         names = ", ".join(box.bearings)

@@ -18,7 +18,7 @@ which turns with the carrier: a carrier that turns or tilts as a whole feels not
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -26,11 +26,12 @@ import numpy as np
 
 from femgear.case.gear_set import line_play, planetary_set
 from femgear.gears.profile import base_helix_angle
+from femgear.report.tables import merged_names
 from femgear.solvers.linear.modal import undamped_modes
 from femgear.stages.static import mesh_backlash
 from femgear.system.assembly import GROUND, Assembly, Contact, assemble, point_approach
 from femgear.system.force_laws import Element, GearMeshes, RadialBearings, turning_wave
-from femgear.system.fourier import FourierSeries, harmonics_of, orders_of
+from femgear.system.fourier import FourierSeries, harmonics_of, orders_of, sample
 from femgear.system.system import HarmonicForce, MechanicalSystem, MeshExcitation, NonlinearSystem
 from femgear.system.turning_meshes import (
     TurningDirections,
@@ -135,7 +136,7 @@ class NonlinearGearbox:
     bearings: Mapping[str, RadialBearings]
 
 
-def nonlinear_gearbox(
+def nonlinear_gearbox(  # noqa: PLR0913
     state: Deflection,
     excitations: Mapping[str, MeshExcitation],
     *,
@@ -146,6 +147,7 @@ def nonlinear_gearbox(
     turning: bool = True,
     damping_ratio: float | None = None,
     mean_damping: bool = True,
+    together: Sequence[Collection[str]] = (),
 ) -> NonlinearGearbox:
     """Assemble a gearbox with the meshes of some stages as elements.
 
@@ -171,6 +173,8 @@ def nonlinear_gearbox(
     mean_damping : bool
         Modes are those with the mean of the meshes over the turn of their carriers, which no angle of theirs prefers;
         without it those with the planets where they stand.
+    together : sequence of collections of str
+        Names of pairs on one carrier whose meshes are one stage here, with the mesh frequency of the first one.
 
     Raises
     ------
@@ -184,19 +188,8 @@ def nonlinear_gearbox(
     assembly, stiffness, load = _structure(state, chosen, carriers.values())
     T = assembly.motions
     rings = _rings(state, assembly)
-    bases, frequency, staged = list[str](), list[float](), list[NonlinearStage]()
-    phases = pair_phases(model.case, model.flow)
-    for stage in chosen:
-        planets = around.get(stage.name)
-        if planets is not None and planets.name not in bases:
-            bases.append(planets.name)
-            frequency.append(abs(planets.speed))
-        record = _in_time(state, stage, excitations, planets, phases)
-        numbers = len(bases), bases.index(planets.name) if planets is not None else -1
-        made = _stage(state, stage, record, planets, numbers, back=separates and back_flanks)
-        bases.append(f"{stage.name} mesh")
-        frequency.append(2.0 * math.pi * model.flow.mesh_frequency[stage.name] / made.excitation.periods)
-        staged.append(made)
+    bases, alone = _alone(state, chosen, excitations, around, together, back=separates and back_flanks)
+    staged = _joined(alone, together)
     coriolis, centrifugal = turning_terms(assembly, carriers.values(), gyroscopic=gyroscopic)
     system = assemble(
         assembly.mass, stiffness + centrifugal, np.zeros((len(T), 0)), load, motions=T, dofs=assembly.free_names
@@ -215,11 +208,80 @@ def nonlinear_gearbox(
     system = replace(system, C=damping + T.T @ coriolis @ T, W=columns, load=balanced)
     forces = [
         force
-        for stage, made in zip(chosen, staged, strict=True)
+        for stage, made in zip(chosen, alone, strict=True)
         for force in _friction_forces(state, stage, made, T, harmonics, len(bases))
     ]
     problem = NonlinearSystem(system, (*elements, *bearings.values()), tuple(forces))
-    return NonlinearGearbox(state, problem, T, tuple(bases), np.array(frequency), tuple(staged), flanks, bearings)
+    frequency = np.array([*bases.values()])
+    return NonlinearGearbox(state, problem, T, tuple(bases), frequency, tuple(staged), flanks, bearings)
+
+
+def _alone(
+    state: Deflection,
+    chosen: Sequence[StageModel],
+    excitations: Mapping[str, MeshExcitation],
+    around: Mapping[str, TurningPlanets],
+    together: Sequence[Collection[str]],
+    *,
+    back: bool,
+) -> tuple[dict[str, float], list[NonlinearStage]]:
+    """Make every stage alone; and the base frequencies [rad/s] of all of them by name."""
+    flow, bases, made = state.model.flow, dict[str, float](), list[NonlinearStage]()
+    phases = pair_phases(state.model.case, flow)
+    joint = {name: next(iter(names)) for names in together for name in names}
+    for stage in chosen:
+        planets, base = around.get(stage.name), f"{joint.get(stage.name, stage.name)} mesh"
+        if planets is not None:
+            bases.setdefault(planets.name, abs(planets.speed))
+        record = _in_time(state, stage, excitations, planets, phases)
+        mesh_frequency = 2.0 * math.pi * flow.mesh_frequency[joint.get(stage.name, stage.name)]
+        bases.setdefault(base, mesh_frequency / record.periods)
+        numbers = [*bases].index(base), [*bases].index(planets.name) if planets is not None else -1
+        made.append(_stage(state, stage, record, planets, numbers, back=back))
+    return bases, made
+
+
+def _joined(stages: Sequence[NonlinearStage], together: Sequence[Collection[str]]) -> list[NonlinearStage]:
+    """Make one stage of those whose meshes are one, in the place of the first of them."""
+    joined = list[NonlinearStage]()
+    for stage in stages:
+        names = next((names for names in together if stage.name in names), None)
+        if names is None:
+            joined.append(stage)
+        elif stage.name == next(other.name for other in stages if other.name in names):
+            joined.append(_one_of([other for other in stages if other.name in names]))
+    return joined
+
+
+def _one_of(stages: Sequence[NonlinearStage]) -> NonlinearStage:
+    """One stage of all meshes of several, without what their friction does."""
+    count = max(stage.excitation.stiffness.shape[1] for stage in stages)
+
+    def positions(values: np.ndarray) -> np.ndarray:
+        return values if values.shape[1] == count else sample(harmonics_of(values, (values.shape[1] - 1) // 2), count)
+
+    def stacked(name: str) -> np.ndarray:
+        return np.concatenate([getattr(stage, name) for stage in stages])
+
+    arrays = {
+        name: np.concatenate([positions(getattr(stage.excitation, name)) for stage in stages])
+        for name in ("stiffness", "deflection", "force")
+    }
+    directions = {
+        name: TurningDirections(*map(np.vstack, zip(*(_parts(getattr(stage, name)) for stage in stages), strict=True)))
+        for name in ("drive", "back", "slope")
+    }
+    backlash = np.concatenate([stage.excitation.backlash for stage in stages])
+    return replace(
+        stages[0],
+        name=merged_names(stage.name for stage in stages),
+        meshes=tuple(mesh for stage in stages for mesh in stage.meshes),
+        excitation=MeshExcitation(**arrays, backlash=backlash, periods=stages[0].excitation.periods),
+        **directions,
+        slope_stiffness=stacked("slope_stiffness"),
+        slope_moment=stacked("slope_moment"),
+        slope_start=stacked("slope_start"),
+    )
 
 
 def _friction_forces(

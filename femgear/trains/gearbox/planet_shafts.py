@@ -106,21 +106,11 @@ def carrier_entries(case: GearboxCase, stage: PairSection, key: str) -> Iterator
             )
 
 
-def branches_in_balance(case: GearboxCase) -> Iterator[CaseError]:
-    """Refuse a harmonic balance of pairs on a carrier (E-TURNING)."""
-    if case.balance.harmonics > 0 and any(stage.carrier is not None for stage in case.pair):
-        yield CaseError(
-            "meshes of all branches have one frequency, but a harmonic balance excites by one pair at a time",
-            code="E-TURNING",
-            key="balance.harmonics",
-            value=case.balance.harmonics,
-            limit="pairs without a carrier, and [[planetary]] sets",
-            remedy="leave balance out: [transient] has all meshes at once, with teeth that part",
-        )
+def unlike_planets(case: GearboxCase, flow: BoxFlow, key: str, remedy: str) -> Iterator[CaseError]:
+    """Refuse planets that are shafts whose masses and springs depend on the angle of their carrier (E-TURNING).
 
-
-def unlike_in_time(case: GearboxCase, flow: BoxFlow) -> Iterator[CaseError]:
-    """Refuse planets that are shafts whose masses and springs depend on the angle of their carrier (E-TURNING)."""
+    Of an entry ``key`` that lets teeth part, with what to do.
+    """
     sets = {running.branches[0].carrier: running for running in running_sets(case)}
     for carrier in turning_carriers(case, flow):
         running, limit = sets.get(carrier), "equal branches, held by gears and bearings on the carrier alone"
@@ -134,10 +124,10 @@ def unlike_in_time(case: GearboxCase, flow: BoxFlow) -> Iterator[CaseError]:
             yield CaseError(
                 f"planets on {carrier} {fault}: masses and springs depend on the angle of the carrier",
                 code="E-TURNING",
-                key="transient",
+                key=key,
                 value=carrier,
                 limit=limit,
-                remedy="make them equal, or write transient.turning = false, which freezes the carrier",
+                remedy=remedy,
             )
 
 

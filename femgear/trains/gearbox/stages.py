@@ -179,7 +179,6 @@ def check_before_run(case: GearboxCase) -> None:
     check_casing_file(case)
     check_held(case)
     check_sensors(case)
-    check_balance(case)
 
 
 def describe_gearbox(case: GearboxCase) -> tuple[Block, ...]:
@@ -334,6 +333,7 @@ GEARBOX = Train(
             options=("progress", "steps"),
             wanted=lambda case: not _no_balance(case),
             unavailable=_no_balance,
+            check=check_balance,
             verdict=lambda result: {"stages": [stage.name for stage in result.stages]},
             describe=lambda results: describe_balance(results.balance),
             tables=lambda results: balance_tables(results.balance),

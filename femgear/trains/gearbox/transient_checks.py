@@ -23,7 +23,7 @@ from femgear.trains.gearbox.case_file import CASING, BoxPlanetarySection, Gearbo
 from femgear.trains.gearbox.geometry import set_sizes
 from femgear.trains.gearbox.model import GearboxModel, gearbox_model
 from femgear.trains.gearbox.planet_branches import running_sets
-from femgear.trains.gearbox.planet_shafts import unlike_in_time
+from femgear.trains.gearbox.planet_shafts import unlike_planets
 from femgear.trains.gearbox.power import gearbox_flow
 from femgear.trains.gearbox.transient_case import (
     FASTEST_RATE,
@@ -224,7 +224,8 @@ def _check_turning_planets(case: GearboxCase) -> None:
     flow = gearbox_flow(case)
     if not case.transient.turning:
         return
-    for problem in unlike_in_time(case, flow):
+    remedy = "make them equal, or write transient.turning = false, which freezes the carrier"
+    for problem in unlike_planets(case, flow, "transient", remedy):
         raise problem
     around = [
         (f"planetary[{number}]", set_sizes(stage).planet_angles)

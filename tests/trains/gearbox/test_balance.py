@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from casings import casing_tables
+from planet_gearboxes import in_casing, known_set, parting_set, planet_shaft, simple_set, stepped_set
 from small_gearbox import loose_pair_tables, pair_tables, planetary_tables
 
 from femgear.errors import CaseError
@@ -34,6 +35,7 @@ from femgear.trains.gearbox.silence import idle_entries, why_no_balance, why_sil
 from femgear.trains.gearbox.stages import solve_box_balance, solve_deflections
 from femgear.trains.gearbox_of_case import gearbox_of_case
 from femgear.trains.reading import read_case, with_value
+from femgear.trains.registry import check_case
 
 
 def heavy_set(torque: str, **balance) -> Deflection:
@@ -232,3 +234,37 @@ def test_weight_alone_moves_planets_of_a_given_stiffness_as_in_the_planar_set():
     still = gearbox_of_case(case).tables
     del still["gravity"]
     assert why_no_balance(read_case(still | {"balance": {"harmonics": 1}}))
+
+
+@pytest.mark.parametrize("torque", [4.0, pytest.param(-4.0, marks=pytest.mark.slow)])
+def test_planets_that_are_shafts_part_as_those_of_a_planetary_stage(torque):
+    """All meshes of one frequency excite at once, and go round with the carrier."""
+    ((shafts,), (stage,)) = (solve_balance(parting_set(make, torque=torque)) for make in (simple_set, known_set))
+    assert shafts.name == "sun-0..2, 0..2-ring" and shafts.solution.converged and stage.solution.converged
+    assert stage.drive.min() == 0.0
+    np.testing.assert_allclose(shafts.drive, stage.drive, rtol=0.0, atol=1e-9 * stage.drive.max())
+    apart = np.abs(shafts.acceleration - stage.acceleration).max()
+    assert apart < 1e-9 * np.abs(stage.acceleration).max()
+
+
+def test_a_stepped_set_has_a_balance_of_each_of_its_frequencies():
+    tables = stepped_set()
+    for stage in tables["pair"]:
+        stage["mesh"] |= {"contact_ratio": 1.63, "low_share": 0.8, "backlash": "20 um"}
+    found = solve_deflection(read_case(in_casing(tables) | {"balance": {"harmonics": 2, "side_bands": 1}}))
+    solved = {stage.name: stage for stage in solve_balance(found)}
+    assert list(solved) == ["0..2-ring", "sun-0..2"]
+    for stage, static in zip(solved.values(), (found.mesh_force[3:], found.mesh_force[:3]), strict=True):
+        assert stage.solution.converged and len(stage.meshes) == 3
+        np.testing.assert_allclose(stage.drive.mean(axis=(0, 1)), static, rtol=1e-3)
+        np.testing.assert_allclose(stage.uneven, stage.uneven[0], rtol=1e-9)
+
+
+def test_planets_with_errors_are_refused_where_teeth_part_and_nowhere_else():
+    tables = simple_set(mesh={"stiffness": "3e8 N/m", "contact_ratio": 1.6}) | {"balance": {"harmonics": 2}}
+    planet_shaft(tables, 1)["pin_error"] = {"tangential": "3 um"}
+    case = read_case(tables)
+    check_case(case, "deflection")
+    with pytest.raises(CaseError) as error:
+        check_case(case, "balance")
+    assert (error.value.code, error.value.key) == ("E-TURNING", "balance.harmonics")

@@ -8,12 +8,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from planet_gearboxes import bending_set
 from small_gearbox import TEETH, pair_tables, planetary_tables
 
 from femgear.errors import CaseError
 from femgear.solvers.periodic.harmonic_balance import displacements, solve_harmonic_balance
 from femgear.system.system import MeshExcitation
 from femgear.trains.gearbox.deflection import Deflection, solve_deflection
+from femgear.trains.gearbox.excitation import pair_count_excitation
 from femgear.trains.gearbox.model import gearbox_model
 from femgear.trains.gearbox.nonlinear import nonlinear_gearbox, normal_backlash
 from femgear.trains.gearbox.stage_structure import stage_excitation
@@ -95,3 +97,25 @@ def test_two_planets_turn_with_no_carrier():
 def test_the_response_is_met():
     for row in gearbox_nonlinear.linear_meshes():
         assert row.ours <= row.gate and math.isfinite(row.ours), row.case
+
+
+def test_meshes_that_are_one_stage_have_the_forces_of_each_alone():
+    """Of helical stepped planets that bend and go round, at any motion, time and angle."""
+    found = solve_deflection(read_case(bending_set(0.3, back=False)))
+    drives = {stage.name: pair_count_excitation(found.model, stage) for stage in found.model.stages}
+    kinds = [tuple(name for name in drives if name.startswith(mate)) for mate in ("sun", "ring")]
+    each, joined = (nonlinear_gearbox(found, drives, harmonics=2, together=names) for names in ((), kinds))
+    assert [stage.name for stage in joined.stages] == ["sun 0..2", "ring 0..2"]
+    motion = np.random.default_rng(1).normal(size=(1, len(each.problem.system.M))) * 1e-5
+    phase = dict(zip(joined.bases, (0.4, 1.1, 2.3), strict=True))
+    forces = []
+    for box in (each, joined):
+        theta = np.array([[phase[base if base in phase else f"{base.split()[0]} 0 mesh"] for base in box.bases]])
+        columns = motion @ box.problem.system.W
+        total = np.zeros_like(columns)
+        for element in box.problem.elements:
+            force = element.evaluate(columns[:, element.columns], theta)[0]
+            np.add.at(total[0], element.columns.ravel(), force.reshape(-1))
+        forces.append(total @ box.problem.system.W.T)
+    np.testing.assert_allclose(forces[1], forces[0], rtol=0.0, atol=1e-10 * np.abs(forces[0]).max())
+    np.testing.assert_allclose(joined.problem.system.C, each.problem.system.C, atol=1e-9 * each.problem.system.C.max())

@@ -219,12 +219,6 @@ def test_carriers_that_carry_nothing_are_refused():
     assert "'arm'" in refused(lambda t: t["pair"][0].update(carrier="arm"))
 
 
-def test_a_harmonic_balance_is_refused_by_name():
-    with pytest.raises(CaseError, match="by one pair at a time") as refusal:
-        read_case(simple_set() | {"balance": {"harmonics": 3}})
-    assert refusal.value.key == "balance.harmonics"
-
-
 def test_planets_that_stand_on_a_turning_carrier_are_told():
     (finding,) = standing_planets(read_case(uneven_planets()))
     assert finding.code == "W-STANDING" and "carrier turns" in finding.text
