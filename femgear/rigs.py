@@ -166,13 +166,19 @@ class RigCheck:
     at_mesh_order: float
     largest: tuple[int, ...]
 
-    def passed(self, rig: Rig) -> tuple[bool, bool]:
-        """Tell whether the places of the lines, and their heights around the mesh order, are those of a rig."""
+    def passed(self, rig: Rig) -> tuple[bool | None, bool | None]:
+        """Tell whether the places of the lines, and their heights around the mesh order, are those of a rig.
+
+        None where there is no line to compare.
+        """
+        places = self.share == 1.0 if self.lines else None
+        if not self.largest:
+            return places, None
         if rig.in_phase:
             heights = self.at_mesh_order < _IN_PHASE_SHARE
         else:
             heights = set(self.largest) == set(sorted(rig.predicted, key=lambda order: -rig.predicted[order])[:2])
-        return self.lines > 0 and self.share == 1.0, heights
+        return places, heights
 
 
 def find_rig(name: str) -> Rig:
@@ -240,9 +246,12 @@ def judge_rig(rig: Rig, path: str | os.PathLike, recording: Recording) -> Block:
     return Block(title, ("", "found", "allowed", ""), tuple(_rows(rig, check)))
 
 
+_WORDS = {True: "passed", False: "not passed", None: "no line to compare"}
+
+
 def _rows(rig: Rig, check: RigCheck) -> Iterator[tuple[str, ...]]:
     """Rows of the rule: what was found, what is allowed, whether it passed."""
-    words = ["passed" if yes else "not passed" for yes in check.passed(rig)]
+    words = [_WORDS[verdict] for verdict in check.passed(rig)]
     at_multiples = f"{check.share:.0%} of {check.lines}"
     yield f"lines at multiples of {rig.planets}", at_multiples, "100 %", words[0]
     if rig.in_phase:
@@ -250,5 +259,5 @@ def _rows(rig: Rig, check: RigCheck) -> Iterator[tuple[str, ...]]:
         yield f"line at the mesh order {rig.teeth[2]}", f"{check.at_mesh_order:.3g}", limit, words[1]
     else:
         strongest = sorted(sorted(rig.predicted, key=lambda order: -rig.predicted[order])[:2])
-        largest = " and ".join(map(str, sorted(check.largest)))
+        largest = " and ".join(map(str, sorted(check.largest))) or "none"
         yield "largest lines at orders", largest, " and ".join(map(str, strongest)), words[1]

@@ -41,7 +41,7 @@ def test_what_is_predicted_passes(rig):
         (SDUST, SDUST.predicted | {147.08: 0.5}, (False, True)),
         (SNU, SNU.predicted | {95: 0.95}, (False, False)),
         (PRETORIA, {57: 1.0, 60: 0.9, 63: 0.8}, (True, False)),
-        (PRETORIA, {}, (False, False)),
+        (PRETORIA, {}, (None, None)),
     ],
 )
 def test_the_rule(rig, lines, passed):

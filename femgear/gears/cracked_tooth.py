@@ -22,6 +22,8 @@ BESIDE = ("above", "below")
 """Regions on both sides of it: that of the tooth first."""
 _TIP_SHARE, _FINEST, _GROWTH = 0.01, 1e-3, 0.25
 """Element edge at the tip of the crack, over its depth and at least over the module; growth of edges away from it."""
+_LEAST = 0.05
+"""Depth of a crack over the module, at least: fifty of the finest edges, and some 0.1 % of the tooth's compliance."""
 _MOST = 0.85
 """Depth of a crack over the length of the section that it lies in."""
 _TANGENT = {False: math.radians(30.0), True: math.radians(60.0)}
@@ -82,6 +84,15 @@ def cracked_outline(
     inwards = 1.0 if gear.internal else -1.0
     direction = np.array([inwards * math.cos(angle), -math.sin(angle)])
     end, section = _opposite(curves, mouth, direction)
+    if not depth >= _LEAST * gear.module:
+        raise GeometryError(
+            f"{gear.name}: a crack of {1e3 * depth:.4g} mm is shorter than the grid of its tooth can show",
+            code="E-FAULT",
+            key="depth",
+            value=f"{1e3 * depth:.4g} mm",
+            limit=f"{1e3 * _LEAST * gear.module:.4g} mm or more, {_LEAST:g} of the module",
+            remedy="give a deeper one, or 0 mm for none",
+        )
     if not depth <= _MOST * section:
         raise GeometryError(
             f"{gear.name}: a crack of {1e3 * depth:.4g} mm goes through the tooth",

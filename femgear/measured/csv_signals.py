@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 
 from femgear.case.text import read_bytes
-from femgear.errors import printable
+from femgear.errors import CaseError, printable
 from femgear.measured.channels import (
     LEAST_SAMPLES,
     MOST_BYTES,
@@ -33,6 +33,8 @@ _LOOKED_AT = 50
 """Lines by which separator and decimal mark are found."""
 _SEPARATORS = (";", "\t", ",", None)
 _NUMBER = {".": r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", ",": r"[+-]?(\d+,?\d*|,\d+)([eE][+-]?\d+)?"}
+_DIGITS, _COMMAS_ALONE = re.compile(r"[+-]?\d+"), re.compile(r"[\d+\-eE]+(,[\d+\-eE]+){2,}")
+"""Whole numbers; lines of nothing else between commas."""
 _LOST = ("nan", "inf", "-inf", "+inf", "")
 """Cells of a sample that is missing, which is refused with its place."""
 _UNITS = {"", "s", "ms", "us", "µs", "g", "v", "mv", "pa", "n", "m/s", "mm/s", "um", "µm", "mm", "rpm", "1/min", "hz"}
@@ -56,6 +58,8 @@ def read_csv_signals(path: str | os.PathLike, *, rate: float | None = None) -> t
     lines = _decoded(read_bytes(path, MOST_BYTES, "name a text file of numbers in columns"), name).splitlines()
     first = _first_of_numbers(lines, name)
     separator, mark = _form(lines, first, name)
+    if separator == ",":
+        _check_decimal_points(lines, first, name)
     values = _numbers(lines, first, separator, mark, name)
     titles = _titles(lines[:first], separator, values.shape[1])
     time = [k for k, (title, _) in enumerate(titles) if is_time(title)]
@@ -120,6 +124,8 @@ def _form(lines: list[str], first: int, name: str) -> tuple[str | None, str]:
         whole = all(number.fullmatch(cell) or cell.lower() in _LOST for row in rows for cell in row)
         if whole and len({len(row) for row in rows}) == 1 and (len(rows[0]) > 1 or separator is None):
             counts[separator, mark] = len(rows[0])
+    if not counts and all(_COMMAS_ALONE.fullmatch(line.strip()) for line in sample):
+        raise _commas_within_commas(sample[0], first, name)
     if not counts:
         remedy = "one separator in all lines, and decimal points or decimal commas throughout"
         raise file_problem(
@@ -130,6 +136,23 @@ def _form(lines: list[str], first: int, name: str) -> tuple[str | None, str]:
     if best == (",", ".") and any(separator is None for separator, _ in counts):
         return _comma_between_or_within(lines, first, most, name)
     return best
+
+
+def _check_decimal_points(lines: list[str], first: int, name: str) -> None:
+    """Refuse columns between commas whose numbers have decimal commas: twice as many cells as names, or as "0,015"."""
+    heading = next((line for line in reversed(lines[:first]) if line.strip()), "")
+    rows = [_cells(line, ",") for line in lines[first : first + _LOOKED_AT] if line.strip()]
+    names, whole = len(_cells(heading, ",")), all(_DIGITS.fullmatch(cell) for row in rows for cell in row)
+    halved = bool(heading) and len(rows[0]) == 2 * names
+    padded = any(cell.startswith("0") and len(cell) > 1 for row in rows for cell in row[1:])
+    if whole and (halved or padded):
+        raise _commas_within_commas(lines[first], first, name)
+
+
+def _commas_within_commas(line: str, first: int, name: str) -> CaseError:
+    remedy = "export with semicolons or tabs between the columns, or with decimal points"
+    words = "decimal commas, and commas between the columns too: no one can tell them apart"
+    return file_problem(f"{name}:{first + 1}", words, value=line[:80], remedy=remedy)
 
 
 def _comma_between_or_within(lines: list[str], first: int, columns: int, name: str) -> tuple[str | None, str]:

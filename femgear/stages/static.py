@@ -763,7 +763,7 @@ STRESS = Stage(
     },
     describe=lambda results: describe_stress(results.stress, results.findings),
     warnings=StressResult.warnings,
-    concerned_by={"": ("W-FILLET", "W-KINK"), "static": ("W-EDGE", "W-KINK", "W-PRESSURE")},
+    concerned_by={"": ("W-EDGE", "W-FILLET", "W-KINK"), "static": ("W-EDGE", "W-KINK", "W-PRESSURE")},
     wanted=lambda case: case.static.stresses,
     unavailable=lambda case: (
         "" if case.helix_angle is None or case.static.slices > 1 else "helical teeth need static.slices = 25"

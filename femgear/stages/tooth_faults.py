@@ -23,9 +23,9 @@ if TYPE_CHECKING:
 
 _LEFT_OUT = {
     MissingTooth: "the body keeps its compliance: the teeth beside the gap have the rim of a whole gear",
-    BrokenTip: "the tooth that is left keeps the compliance of a whole one, and pressure at its new edge has no limit",
+    BrokenTip: "the tooth that is left keeps the compliance of a whole one",
     Spall: "a pit that only separates flanks leaves out that the tooth has lost material, some per cent of the "
-    "transmission error; pressures at its edges have no limit",
+    "transmission error",
     Crack: "faces of the crack touch without friction, the crack does not grow, and stresses in the root of its tooth "
     "are those of a whole one",
 }
@@ -49,6 +49,9 @@ def left_out_of_faults(case: Any) -> Iterator[Finding]:
     for key, fault in keyed_faults(case, planetary_set(case)):
         if (text := _LEFT_OUT.get(type(fault))) is not None:
             yield Finding("W-FAULT", key, text, remedy="take sizes with that margin; orders and places are exact")
+        if isinstance(fault, Spall | BrokenTip):
+            text = "the flank has a sharp edge, where pressure has no limit: the largest one is that of the grid"
+            yield Finding("W-EDGE", key, text, remedy="look at pressures away from the faulty tooth")
 
 
 def _carrying(gears: GearSet, fault: ToothFault, *, back: bool) -> set[int]:

@@ -59,7 +59,12 @@ def test_it_starts_where_the_critical_section_is_or_where_it_is_told(gears):
 
 @pytest.mark.parametrize(
     ("entries", "key"),
-    [({"depth": 5e-3}, "depth"), ({"start": 22e-3}, "diameter"), ({"angle": math.radians(-100.0)}, "angle")],
+    [
+        ({"depth": 5e-3}, "depth"),
+        ({"depth": 1e-6}, "depth"),
+        ({"start": 22e-3}, "diameter"),
+        ({"angle": math.radians(-100.0)}, "angle"),
+    ],
 )
 def test_cracks_that_no_tooth_has_are_refused(gears, entries, key):
     given = {"angle": ANGLE, "depth": 1e-3, "start": None} | entries

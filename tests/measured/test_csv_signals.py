@@ -83,6 +83,9 @@ ROWS = "".join(f"{t:.4f};{x:.6f}\n" for t, x in zip(TIME, VALUES[0]))
         ("time [s];a\n" + "".join(ROWS.splitlines(True)[:100] + ROWS.splitlines(True)[110:]), "not even"),
         ("\0\1\2" * 100, "bytes that no text has"),
         ("", "the file is empty"),
+        ("time,a\n" + ROWS.replace(".", ",").replace(";", ","), "decimal commas, and commas between the columns"),
+        (ROWS.replace(".", ",").replace(";", ","), "decimal commas, and commas between the columns"),
+        ("t,a\n" + ROWS.replace(".", ",").replace(";", ",").replace("0,0010", "0"), "commas between the columns"),
     ],
 )
 def test_hostile_files_are_refused_with_what_to_do(text, words, tmp_path):

@@ -64,6 +64,19 @@ def test_averages_densities_and_responses_are_written(tmp_path, capsys):
     assert cli.main([*words, "--average", "ring"]) == 2 and "no such average" in capsys.readouterr().err
 
 
+def test_pulses_that_are_counted_as_half_of_them_are_told_with_the_factor(tmp_path, recwarn):
+    path = written(tmp_path, HEALTHY, HEALTHY.values())
+    measured_verdict(read_case(CASE), path, Recording(pulses="tacho"))
+    assert not [one for one in recwarn if "W-UNSTEADY" in str(one.message)]
+    measured_verdict(read_case(CASE), path, Recording(pulses="tacho", per_turn=2))
+    (text,) = (str(one.message) for one in recwarn if "W-UNSTEADY" in str(one.message))
+    assert (
+        "only multiples of 2 have lines" in text
+        and "if the carrier made 2 times as many turns" in text
+        and "--per-turn" in text
+    )
+
+
 def test_silence_has_no_lines(tmp_path):
     verdict = measured_verdict(read_case(CASE), written(tmp_path, [3], [1e-6], noise=1e6), Recording(pulses="tacho"))
     assert verdict.lines == ()

@@ -49,8 +49,9 @@ def test_a_whole_set_has_nothing_to_say(healthy):
 
 def test_faults_say_what_is_left_out(healthy):
     spall = {"kind": "spall", "tooth": 3, "flank": "left", "diameter": "42 mm", "length": "1 mm", "depth": "40 um"}
-    (said,) = texts(with_values(healthy, {"sun.fault": [spall]}))
+    said, edge = texts(with_values(healthy, {"sun.fault": [spall]}))
     assert said.startswith("[W-FAULT] sun.fault[0]: a pit that only separates flanks")
+    assert edge.startswith("[W-EDGE] sun.fault[0]: the flank has a sharp edge")
 
 
 def test_a_fault_on_an_idle_flank_is_told(healthy):
