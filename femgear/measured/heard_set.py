@@ -72,7 +72,7 @@ class MeshLines:
     factor: float
 
 
-def mesh_lines(gear_set: HeardSet, order: np.ndarray, height: np.ndarray, tolerance: float) -> MeshLines:
+def lines_near_mesh(gear_set: HeardSet, order: np.ndarray, height: np.ndarray, tolerance: float) -> MeshLines:
     """Look for lines (k,) at orders near mesh harmonics, and for a factor that would bring them to all of these.
 
     Such factors come from pulses that are counted as those of another shaft, or as more or fewer a turn.

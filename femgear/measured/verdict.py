@@ -16,7 +16,7 @@ from femgear.findings import Finding, tell
 from femgear.housing.orders import OrderSpectrum, array_factor, spacing_symmetry
 from femgear.measured.averages import carrier_average, gear_average
 from femgear.measured.channels import choose_channel
-from femgear.measured.heard_set import HeardSet, MeshLines, heard_set, mesh_lines
+from femgear.measured.heard_set import HeardSet, MeshLines, heard_set, lines_near_mesh
 from femgear.measured.lines import (
     VERDICTS,
     MeasuredLine,
@@ -95,7 +95,7 @@ def measured_verdict(
     spectrum = windowed_spectrum(signal)
     order, height = sharpened_lines(spectrum, search.threshold)
     wrong = level_uncertainty(spectrum, order, height, time_error=signal.time_error, speed=signal.speed)
-    _tell_wrong_turns(mesh_lines(gear_set, order, height, tolerance), recording, float(spectrum.order[-1]))
+    _tell_wrong_turns(lines_near_mesh(gear_set, order, height, tolerance), recording, float(spectrum.order[-1]))
     lines = judge_lines(order, height, wrong, gear_set.angles, gear_set.teeth, tolerance)
     return MeasuredVerdict(gear_set, signal, spectrum, lines, tolerance)
 

@@ -7,7 +7,7 @@ import pytest
 
 from femgear import read_case
 from femgear.errors import CaseError
-from femgear.measured.heard_set import heard_set, mesh_lines
+from femgear.measured.heard_set import heard_set, lines_near_mesh
 from femgear.trains.reading import with_values
 
 CASES = Path(__file__).parents[2] / "cases"
@@ -25,11 +25,11 @@ def test_lines_off_the_mesh_tell_the_factor_that_brings_them_there(factor, order
     """Of counts that are taken for one another; nothing explains 0.7."""
     heard = heard_set(read_case(CASES / "planetary_27_40_108.toml"))
     places = order * np.array([105.0, 111.0, 213.0, 219.0, 321.0, 327.0])
-    found = mesh_lines(heard, places, np.array([0.3, 0.2, 0.5, 0.4, 1.0, 0.9]), 0.02)
+    found = lines_near_mesh(heard, places, np.array([0.3, 0.2, 0.5, 0.4, 1.0, 0.9]), 0.02)
     assert found.factor == pytest.approx(factor)
     assert found.share < 0.02 if order in (0.5, 0.7) else found.share <= 1.0
     assert order != 1.0 or found.share == 1.0
-    assert mesh_lines(heard, np.zeros(0), np.zeros(0), 0.02).share == 1.0
+    assert lines_near_mesh(heard, np.zeros(0), np.zeros(0), 0.02).share == 1.0
 
 
 def test_other_cases_are_refused():
