@@ -199,7 +199,18 @@ def test_verdict_stands_before_the_stages_and_trust_is_folded_away_at_the_end(tm
         # what is folded away is shown where no script opens it for paper
         assert text.count("<details") == folded and text.count(" open>") == folded
     titles = [stage.title for stage in ELASTIC.stages]
-    assert titles == ["Static", "Stresses", "Losses", "Temperatures", "Life", "Modes", "Run-up", "Dynamics", "Housing"]
+    assert titles == [
+        "Static",
+        "Stresses",
+        "Losses",
+        "Temperatures",
+        "Life",
+        "Modes",
+        "Run-up",
+        "Dynamics",
+        "Housing",
+        "What the level rests on",
+    ]
 
 
 def test_static_results_alone_make_a_page(tmp_path):
