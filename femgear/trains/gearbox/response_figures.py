@@ -35,6 +35,8 @@ LINES_NAMED = 5
 _DECADES = 4.0  # below the largest value that are drawn
 _WIDE = 60  # lines of a stage that are drawn wide, at most
 _ROOM = 0.34  # share of the height of a spectrum for the names
+_WEIGHTED_COLOUR = "#595959"
+"""Of levels in dB(A): a grey whose words can be read on white."""
 _STAGE_COLOURS = tuple(colour for colour in COLOURS if colour != BLACK)
 
 
@@ -121,7 +123,7 @@ def draw_run_up_levels(
         _mark_operation(ax, runup, operation)
         if "weighted_level" in runup:
             weighted, words_at_right = runup["weighted_level"].values[:, sensor], "A-weighted\n[dB(A) re 1 µm/s²]"
-            draw_at_right(ax, speed, words_at_right, weighted, colour=GREY, dash="--")
+            draw_at_right(ax, speed, words_at_right, weighted, colour=_WEIGHTED_COLOUR, dash="--")
         label(ax, y="level, r.m.s. [m/s²]", title=f"sensor {runup['sensor'].values[sensor]}")
     label(axes[-1], f"speed of {runup.attrs['reference']} [rpm]")
     if words:
