@@ -15,6 +15,8 @@ from femgear.housing.sound import REFERENCE_ACCELERATION, a_weighting
 from femgear.report.tables import Block, in_decibels, tabulate
 from femgear.stages.protocol import StageResult
 from femgear.storage.contents import Contents
+from femgear.trains.gearbox.case_file import CASING
+from femgear.trains.gearbox.model import GearboxModel
 from femgear.trains.gearbox.resonance_table import resonance_variables
 from femgear.trains.gearbox.response import GearboxResponse, StageLines, accelerations, by_order, level
 from femgear.trains.gearbox.run_up_speeds import GearboxResonances
@@ -129,10 +131,21 @@ class GearboxResponseResult(StageResult):
             "reference": response.reference,
             "missing": ", ".join(response.missing),
             "rigid": ", ".join(_rigid_bodies(response)),
+            "standing": ", ".join(_standing_carriers(model)),
             "unresolved_resonances": self.unresolved,
         }
         used = {dim for entry in variables.values() for dim in entry[0].split()}
         return Contents(variables, {name: entry for name, entry in coords.items() if name in used}, attrs)
+
+
+def _standing_carriers(model: GearboxModel) -> list[str]:
+    """Name the carriers that stand: those of the casing by their stage."""
+    named = {
+        f"the carrier of {stage.name}" if stage.carrier == CASING else stage.carrier: stage.carrier
+        for stage in (*model.case.planetary, *model.case.pair)
+        if stage.carrier is not None
+    }
+    return [name for name, carrier in named.items() if carrier == CASING or not model.flow.speed[carrier]]
 
 
 def _at_sensors(response: GearboxResponse, moved: dict[str, np.ndarray]) -> dict[str, tuple]:
@@ -490,7 +503,11 @@ def describe_gearbox_response(data: xr.Dataset, title: str = "Response of the st
         "mesh harmonics": lambda i: f"{int(data['mesh_harmonics'].values[worst(i), i])}",
     }
     note = f"excitation up to {_reach(data)}; speeds are those of {data.attrs['reference']}"
-    return tabulate(title, range(data.sizes["stage"]), columns, (note,))
+    notes = [
+        note,
+        *([f"{standing}: stands, planets make no side bands"] if (standing := data.attrs.get("standing", "")) else []),
+    ]
+    return tabulate(title, range(data.sizes["stage"]), columns, tuple(notes))
 
 
 def response_tables(data: xr.Dataset) -> Iterator[Block]:

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 import xarray as xr
 from casings import RPM, pair_in_a_casing, response
+from planet_gearboxes import COUNTED, in_casing, responded, simple_set
 
 from femgear.housing.sound import a_weighting
 from femgear.trains.gearbox.response import solve_gearbox_response
@@ -193,3 +194,15 @@ def test_ways_that_cancel_have_no_share():
     assert main_way(small_response(), 0) == "bearing A (70% of the power)"
     cancelling = (("speed", "path", "sensor"), [[[-11.0], [12.0]]] * 2)
     assert main_way(small_response(path_share=cancelling), 0) == "bearing B, but bearing A takes most of that away"
+
+
+@pytest.mark.parametrize("fixed", ["carrier", "ring"])
+def test_a_carrier_that_stands_is_said_to_make_no_side_bands(fixed):
+    tables = simple_set(teeth=(28, 38, 104), mesh=COUNTED, motions="plane", fixed=fixed)
+    data = GearboxResponseResult(responded(in_casing(tables, harmonics=2)), whole=True).dataset()
+    stands = fixed == "carrier"
+    assert data.attrs["standing"] == ("carrier" if stands else "")
+    assert ("no side bands" in " ".join(describe_gearbox_response(data).notes)) is stands
+    # lines beside mesh harmonics
+    harmonics = data["order"].values / data["order"].values[data["harmonic"].values == 1].min()
+    assert bool(np.allclose(harmonics, np.rint(harmonics))) is stands
