@@ -503,10 +503,9 @@ def describe_gearbox_response(data: xr.Dataset, title: str = "Response of the st
         "mesh harmonics": lambda i: f"{int(data['mesh_harmonics'].values[worst(i), i])}",
     }
     note = f"excitation up to {_reach(data)}; speeds are those of {data.attrs['reference']}"
-    notes = [
-        note,
-        *([f"{standing}: stands, planets make no side bands"] if (standing := data.attrs.get("standing", "")) else []),
-    ]
+    notes = [note]
+    if standing := data.attrs.get("standing", ""):
+        notes.append(f"{standing}: stands, its planets make no side bands")
     return tabulate(title, range(data.sizes["stage"]), columns, tuple(notes))
 
 
