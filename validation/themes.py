@@ -365,7 +365,8 @@ THEMES = (
         "Faulty teeth",
         "Reference set, cracks at 70° to the centre line of their tooth, their faces open. Orders: sets of 3, 4 and 5 "
         "planets, also bolted and at unequal angles, with a worn tooth, as sets and as stages of gearboxes. "
-        "Recordings: computed signals with noise and a speed that wanders by 1 %, through files of four formats. Data sets: records alone and among others. "
+        "Recordings: computed signals with noise and a speed that wanders by 1 %, through files of four formats. "
+        "Data sets: records alone and among others. "
         "Compared with: the whole matrix of all cuts; one grid of all teeth; the healthy gear where nothing parts; the "
         "energy release rate by J in two domains; published frequencies of a set 17/37/91; formulas of the orders; "
         "gates: 1e-12; 1 %; every bit; 2 %; printed digits; 1e-9 of the largest line; 3 % of a gearbox beside the set; "
