@@ -163,7 +163,11 @@ def _counts(text: str) -> range:
     if not first.isdecimal() or not (last if dots else "1").isdecimal() or max(len(first), len(last)) > 3:
         remedy = "write --planets 4, or --planets 3..5 for all from 3 to 5"
         raise CaseError("no numbers of planets", code="E-TYPE", key="--planets", value=text, remedy=remedy)
-    return range(int(first), int(last if dots else first) + 1)
+    counts = range(int(first), int(last if dots else first) + 1)
+    if not counts:
+        remedy = f"write --planets {last}..{first}"
+        raise CaseError("numbers that fall", code="E-RANGE", key="--planets", value=text, limit="3..5", remedy=remedy)
+    return counts
 
 
 def _computed(

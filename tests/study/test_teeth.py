@@ -154,6 +154,11 @@ def test_words_that_are_no_numbers_are_refused_together(tmp_path):
     assert not (tmp_path / "out").exists()
 
 
+def test_numbers_of_planets_that_fall_are_refused(tmp_path):
+    done = run_femgear("teeth", "--ratio", "5", "--planets", "5..3", "-o", "out", folder=tmp_path)
+    assert done.returncode == 2 and "--planets 3..5" in done.stderr
+
+
 def test_the_picture_names_the_front_alone():
     from femgear.study.figures import size_and_error
 

@@ -30,12 +30,16 @@ _RECORD = 2**13
 
 
 def exciting_stages(state: Deflection) -> list[StageModel]:
-    """List the stages that excite a gearbox: by their contact, or by the contact ratios of meshes that carry."""
+    """List the stages that excite a gearbox: by their contact, or by the contact ratios of meshes that carry.
+
+    Teeth of stages that turn as a block do not pass, and excite nothing.
+    """
     model = state.model
     return [
         stage
         for stage in model.stages
-        if stage.name in state.contacts or (stage.section.counts_pairs and model.flow.carries(stage.section))
+        if model.flow.passes(stage.section)
+        and (stage.name in state.contacts or (stage.section.counts_pairs and model.flow.carries(stage.section)))
     ]
 
 

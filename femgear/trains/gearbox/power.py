@@ -21,7 +21,7 @@ from femgear.trains.gearbox.geometry import carriers, pair_sizes, set_sizes
 
 # Torque of a stage over the largest one of any that counts as none.
 _IDLE = 1e-9
-# Speed over the largest one of the gearbox that is none.
+# Speed over the largest one of the gearbox, or passing teeth over its turns, that is none.
 _STILL = 1e-9
 # Where the refusals of the graph stand in the case file.
 _KEYS = {
@@ -105,6 +105,11 @@ class BoxFlow:
         """Whether a torque goes through a stage."""
         largest = max(abs(torque) for torques in self.stage_torque.values() for torque in torques.values())
         return abs(self.first_torque(stage)) > _IDLE * largest
+
+    def passes(self, stage: PairSection | BoxPlanetarySection) -> bool:
+        """Whether the teeth of a stage pass one another: those of one that turns as a block do not."""
+        turns = max(map(abs, self.speed.values())) / (2.0 * math.pi)
+        return abs(self.mesh_frequency[stage.name]) > _STILL * turns
 
     @property
     def mesh_frequency(self) -> dict[str, float]:

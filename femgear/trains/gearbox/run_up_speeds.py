@@ -91,7 +91,7 @@ def gearbox_resonances(
         at_sensors += (ring.sensor_rows(gearbox_sensors(case)) @ part).T
         count += len(ring.stiffness)
     up_to, nominal = case.dynamics.up_to, abs(model.flow.speed[reference_shaft(model)])
-    parts, names, joint = [np.zeros((5, 0))], list[str](), joint_names(case)
+    parts, names, joint = [np.zeros((6, 0))], list[str](), joint_names(case)
     for stage in exciting_stages(state):
         excitation = excitation_of(state, stage, rings, steps=steps)
         mesh_turns = model.flow.mesh_frequency[stage.name] / nominal
@@ -106,10 +106,30 @@ def gearbox_resonances(
         crossed = crossings(forces, mesh_turns * slowest, mesh_turns * fastest, up_to)
         strength = forces.heard[crossed.row, crossed.harmonic - 1]
         modal = forces.damping_ratio[crossed.row], crossed.harmonic, forces.frequency[crossed.row]
-        parts.append(np.array([crossed.mesh_frequency / mesh_turns, strength, *modal]))
+        parts.append(np.array([crossed.mesh_frequency / mesh_turns, strength, *modal, crossed.row]))
         names += [joint.get(stage.name, stage.name)] * len(crossed.row)
-    speed, strength, damping, harmonic, frequency = np.concatenate(parts, axis=1)
-    return GearboxResonances(speed, strength, damping, tuple(names), harmonic.astype(int), frequency)
+    every = np.concatenate(parts, axis=1)
+    kept = strongest_of_each(names, every[[3, 5]], every[1])
+    speed, strength, damping, harmonic, frequency, _ = every[:, kept]
+    return GearboxResonances(speed, strength, damping, tuple(names[at] for at in kept), harmonic.astype(int), frequency)
+
+
+def strongest_of_each(names: list[str], place: np.ndarray, heard: np.ndarray) -> list[int]:
+    """Find the resonances that stand for all: equal branches excite a mode together, the strongest one is kept.
+
+    Parameters
+    ----------
+    names : list of str, (n,)
+        Of what excites.
+    place : (2, n) array
+        Harmonics and numbers of the modes.
+    heard : (n,) array
+        How strong they are.
+    """
+    strongest = dict[tuple[str, float, float], int]()
+    for at in np.argsort(-heard, kind="stable").tolist():
+        strongest.setdefault((names[at], float(place[0, at]), float(place[1, at])), at)
+    return sorted(strongest.values())
 
 
 def _with_meshes(modes: Modes, state: Deflection, stage: StageModel, stiffness: np.ndarray, mean: np.ndarray) -> Modes:

@@ -35,6 +35,9 @@ def _silence(case: GearboxCase) -> tuple[str, str]:
     reference = flow.independent[0] if flow.independent else case.shaft[0].name
     if not flow.speed[reference]:
         return "nothing turns", f"give a speed that is not zero in the load case of {first}"
+    if not any(flow.carries(stage) and flow.passes(stage) for stage in stages):
+        why = "the stages that carry turn as a block: no teeth pass one another"
+        return why, f"give speeds that differ in the load case of {first}"
     return "", ""
 
 

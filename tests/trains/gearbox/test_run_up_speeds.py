@@ -5,7 +5,12 @@ import pytest
 from casings import RPM, pair_in_a_casing
 
 from femgear.trains.gearbox.response import accelerations, level, solve_gearbox_response
-from femgear.trains.gearbox.run_up_speeds import GearboxResonances, gearbox_resonances, run_up_speeds
+from femgear.trains.gearbox.run_up_speeds import (
+    GearboxResonances,
+    gearbox_resonances,
+    run_up_speeds,
+    strongest_of_each,
+)
 
 
 @pytest.fixture(scope="module")
@@ -70,3 +75,8 @@ def test_a_speed_alone_stays_alone(count):
 def test_without_resonances_the_steps_remain():
     steps = np.linspace(50.0, 250.0, 5)
     assert run_up_speeds(steps, meetings(*np.zeros((3, 0))))[0] == pytest.approx(steps)
+
+
+def test_of_equal_branches_the_strongest_stands_for_all():
+    place = np.array([[1.0, 1.0, 1.0, 2.0], [4.0, 4.0, 4.0, 4.0]])
+    assert strongest_of_each(["sun", "sun", "ring", "sun"], place, np.array([0.2, 0.3, 0.1, 0.1])) == [1, 2, 3]

@@ -1,8 +1,9 @@
 """Gearboxes without a response, and the entries that have no effect then."""
 
 import pytest
-from small_gearbox import pair_tables
+from small_gearbox import pair_tables, planetary_tables
 
+from femgear.trains.gearbox.power import gearbox_flow
 from femgear.trains.gearbox.silence import idle_entries, why_silent
 from femgear.trains.reading import read_case
 from femgear.trains.registry import train_of
@@ -50,3 +51,22 @@ def test_entries_of_a_response_that_there_is_not_are_told(teeth, change, words):
 def test_a_gearbox_that_is_heard_says_nothing():
     case = read_case(pair_tables(teeth=True) | ASKED)
     assert why_silent(case) == "" and not [*idle_entries(case)]
+
+
+MESH = {"stiffness": "3e8 N/m", "contact_ratio": 1.5}
+
+
+@pytest.mark.parametrize(("ring", "words"), [("1000 rpm", "turn as a block"), ("900 rpm", "")])
+def test_teeth_of_a_set_that_turns_as_a_block_do_not_pass(ring, words):
+    tables = planetary_tables(ring="ring", sun_mesh=MESH, ring_mesh=MESH)
+    tables["shaft"].append({"name": "ring"})
+    tables["mass"].append({"shaft": "ring", "mass": "4 kg", "inertia": "2e-2 kg m^2"})
+    tables["bearing"].append(tables["bearing"][1] | {"shaft": "ring"})
+    tables["operation"] = {
+        "output": ["carrier", "ring"],
+        "load_case": [{"torque": {"sun": "100 N m"}, "speed": {"sun": "1000 rpm", "ring": ring}}],
+    }
+    case = read_case(tables)
+    flow = gearbox_flow(case)
+    assert words in why_silent(case) and bool(words) == bool(why_silent(case))
+    assert flow.passes(case.planetary[0]) == (not words) and flow.carries(case.planetary[0])
