@@ -114,7 +114,7 @@ def gearbox_resonances(
     return GearboxResonances(speed, strength, damping, tuple(names[at] for at in kept), harmonic.astype(int), frequency)
 
 
-def strongest_of_each(names: list[str], place: np.ndarray, heard: np.ndarray) -> list[int]:
+def strongest_of_each(names: list[str], place: np.ndarray, strength: np.ndarray) -> list[int]:
     """Find the resonances that stand for all: equal branches excite a mode together, the strongest one is kept.
 
     Parameters
@@ -123,11 +123,11 @@ def strongest_of_each(names: list[str], place: np.ndarray, heard: np.ndarray) ->
         Of what excites.
     place : (2, n) array
         Harmonics and numbers of the modes.
-    heard : (n,) array
+    strength : (n,) array
         How strong they are.
     """
     strongest = dict[tuple[str, float, float], int]()
-    for at in np.argsort(-heard, kind="stable").tolist():
+    for at in np.argsort(-strength, kind="stable").tolist():
         strongest.setdefault((names[at], float(place[0, at]), float(place[1, at])), at)
     return sorted(strongest.values())
 
