@@ -334,9 +334,13 @@ def _multipliers(natural, damping_ratio, rows, kicks, period) -> np.ndarray:
     """Largest multiplier (n_speeds,) of one group of modes, followed through one period.
 
     Of every mode ``z = (q' + zeta w q) / w_d + i q``, which turns freely by ``exp((-zeta w + i w_d) t)``.
+    Modes that deflect no mesh, as gears that move across the line of action, do so over the whole period.
     """
     speeds, m, steps = len(period), len(natural), len(kicks) // 2
     dt, damped = period / steps, natural * np.sqrt(1.0 - damping_ratio**2)
+    free = -damping_ratio * natural + 1j * damped
+    if not rows.any():
+        return np.exp(free[(damping_ratio * natural).argmin()] * period)
     # the forces of fewer combinations of meshes than there are: equal meshes in phase move the group as one
     left, size, _ = np.linalg.svd(rows, full_matrices=False)
     joint = left[:, size > _RANK * size.max()]
@@ -344,7 +348,7 @@ def _multipliers(natural, damping_ratio, rows, kicks, period) -> np.ndarray:
     back = -(rows / damped).T
     first, middle = kicks[::2], kicks[1::2]
     corrected = np.concatenate([middle / 1.5, middle @ (rows @ rows.T) @ middle / -36.0], axis=-1)
-    turn = np.exp((-damping_ratio * natural + 1j * damped)[:, None, None] * (0.5 * dt))
+    turn = np.exp(free[:, None, None] * (0.5 * dt))
     # one column for each unknown, speeds last
     state: Any = np.zeros((m, 2 * m, speeds), complex)
     state[range(m), range(m)], state[range(m), range(m, 2 * m)] = 1.0, 1.0j

@@ -91,6 +91,20 @@ def test_modes_left_out_keep_their_own_decay(geared_chain, chain_excitation):
         np.testing.assert_allclose(found.modulus, exact, rtol=1e-9)
 
 
+@pytest.mark.parametrize("slowest", [0, 2], ids=["first", "third"])
+def test_a_mode_that_deflects_no_mesh_keeps_its_own_motion(geared_chain, chain_excitation, slowest):
+    """As a gear on equal bearings that moves across the line of action: exp((-zeta omega + i omega_d) T)."""
+    excitation = chain_excitation(0.02)
+    modes = undamped_modes(geared_chain, excitation.stiffness.mean(axis=1), damping_ratio=0.1)
+    ratio, deflection = modes.damping_ratio.copy(), modes.mesh_deflection.copy()
+    chosen = np.flatnonzero(modes.frequency > 0.0)[slowest]
+    ratio[chosen], deflection[:, chosen] = 1e-3, 0.0
+    frequency = modes.frequency.max() * np.array([1.0, 1.3])
+    found = stability(replace(modes, damping_ratio=ratio, mesh_deflection=deflection), excitation, frequency)
+    root = 2.0 * np.pi * modes.frequency[chosen] * (-1e-3 + 1j * np.sqrt(1.0 - 1e-6))
+    np.testing.assert_allclose(found.multiplier, np.exp(root / frequency), rtol=1e-12)
+
+
 def test_slow_speeds_of_a_batch_get_the_steps_that_they_need(geared_chain, chain_excitation):
     excitation = chain_excitation(0.6)
     modes = undamped_modes(geared_chain, excitation.stiffness.mean(axis=1), damping_ratio=0.005)
