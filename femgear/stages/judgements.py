@@ -414,6 +414,10 @@ def _against(results: Any, stages: Sequence[str]) -> Iterator[str]:
 
 
 _CLEAR = "no resonance makes the level at a speed of operation"
+MAKES_LEVEL = 0.5
+"""Share of the level from which on one resonance makes it."""
+NEAR_RESONANCE = 10.0
+"""Distance up to which a resonance counts at a speed of operation [%]."""
 
 
 @dataclass(frozen=True)
@@ -457,6 +461,31 @@ def margins_of_levels(
         yield LevelMargin(float(raised[at]), float(speed[at]), f"{place} with a longer excitation")
 
 
+def resonance_of_line(line: str, hertz: float, modes: np.ndarray, share: float) -> str:
+    """Write the resonance that makes the level by its main line; empty where none does.
+
+    Parameters
+    ----------
+    line : str
+        The main line at the speed of operation, with its frequency.
+    hertz : float
+        Its frequency [Hz].
+    modes : (m,) array
+        Natural frequencies [Hz]; those at zero are no resonances.
+    share : float
+        Share of the line in the power of the level, the square of that in the level.
+    """
+    distance = np.where(modes > 0.0, 100.0 * (hertz / np.where(modes > 0.0, modes, 1.0) - 1.0), np.inf)
+    if not distance.size or share < MAKES_LEVEL**2:
+        return ""
+    mode = int(np.abs(distance).argmin())
+    if abs(distance[mode]) > NEAR_RESONANCE:
+        return ""
+    side = "below" if distance[mode] < 0.0 else "above"
+    apart = f"{abs(distance[mode]):.1f} % {side} mode {mode + 1} at {modes[mode]:,.0f} Hz"
+    return f"{line}, {apart}, makes {share:.0%} of the power"
+
+
 def judge_noise(
     answer: str,
     sentence: str,
@@ -483,15 +512,15 @@ def judge_noise(
         Doubts of the levels, in words: below a limit such levels deserve a look.
     """
 
-    def doubted(limit: str) -> str:
-        return "; ".join(filter(None, (limit, doubts)))
+    def doubted(*limit: str) -> str:
+        return "; ".join(filter(None, (*limit, doubts)))
 
     if margins:
         worst = max(margins, key=lambda margin: margin.decibels)
         if worst.decibels > 0.0:
             return Judgement(QUIET, "bad", answer, doubted(worst.words), f"{sentence}. Too loud: {worst.words}")
         state: State = "look" if resonance or doubts else "good"
-        return Judgement(QUIET, state, answer, doubted(resonance or worst.words), sentence)
+        return Judgement(QUIET, state, answer, doubted(resonance, worst.words), sentence)
     if resonance:
         return Judgement(QUIET, "look", answer, doubted(resonance), sentence)
     return Judgement(QUIET, "open", answer, doubted(open_words), sentence)

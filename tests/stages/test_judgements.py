@@ -23,6 +23,7 @@ from femgear.stages.judgements import (
     lives_of_bearings,
     lives_of_teeth,
     margins_of_levels,
+    resonance_of_line,
     unrated_gears,
     without_life,
 )
@@ -210,13 +211,26 @@ def test_a_level_without_a_limit_is_judged_by_resonances_alone():
     assert judge_noise("1 m/s²", "so").state == "open"
 
 
+def test_a_line_beside_a_mode_is_the_resonance_of_a_level_of_which_it_makes_half():
+    modes = np.array([0.0, 1200.0, 3780.0])
+    words = resonance_of_line("mesh harmonic 1 at 3,750 Hz", 3750.0, modes, 0.98)
+    # 3750/3780 - 1 = -0.79 %
+    assert words == "mesh harmonic 1 at 3,750 Hz, 0.8 % below mode 3 at 3,780 Hz, makes 98% of the power"
+    assert "9.9 % above mode 2" in resonance_of_line("a line", 1319.0, modes, 0.25)
+    # half of the level is a quarter of its power
+    assert not resonance_of_line("a line", 3750.0, modes, 0.24)
+    assert not resonance_of_line("a line", 1321.0, modes, 0.98) and not resonance_of_line("a line", 10.0, modes, 0.98)
+    assert not resonance_of_line("a line", 3750.0, np.zeros(0), 0.98)
+
+
 def test_a_level_is_judged_by_the_worst_of_its_limits():
     speed = np.array([1000.0, 2000.0, 3000.0])
     every = ([-9.0, -3.0, -5.0], [-2.0, 1.5, 0])
     (below,), (over,) = (tuple(margins_of_levels(speed, np.array(values), "foot")) for values in every)
     holds = judge_noise("1 m/s²", "so", margins=(below,))
     assert (holds.state, holds.limit) == ("good", "3.0 dB below the limit at foot, 2,000 rpm")
-    assert judge_noise("1 m/s²", "so", "mode 3 meets mesh harmonic 2", margins=(below,)).state == "look"
+    met = judge_noise("1 m/s²", "so", "mode 3 meets mesh harmonic 2", margins=(below,))
+    assert (met.state, met.limit) == ("look", f"mode 3 meets mesh harmonic 2; {holds.limit}")
     doubtful = judge_noise("1 m/s²†", "so", margins=(below,), doubts="† it ends short")
     assert (doubtful.state, doubtful.limit) == ("look", f"{holds.limit}; † it ends short")
     fails = judge_noise("1 m/s²", "so", "mode 3 meets mesh harmonic 2", margins=(below, over))

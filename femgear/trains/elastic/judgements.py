@@ -11,21 +11,19 @@ from femgear.case.level_limits import limit_at
 from femgear.report.tables import Marks, is_bound, level_change_at
 from femgear.stages.assumptions import most_decisive
 from femgear.stages.judgements import (
+    MAKES_LEVEL,
+    NEAR_RESONANCE,
     Judgement,
     LevelMargin,
     doubt_words,
     judge_noise,
     judge_numbers,
     margins_of_levels,
+    resonance_of_line,
 )
 from femgear.stages.train_judgements import judge_teeth
 from femgear.trains.elastic.results import known_factors, level_changes, level_doubts, marked_level, rate_set
 from femgear.trains.elastic.runup import loudest
-
-_MAKES = 0.5
-"""Share of the level from which on one resonance makes it."""
-_NEAR = 10.0
-"""Distance up to which a resonance counts at a speed of operation [%]."""
 
 
 def set_with_ring_judgements(results: Any) -> Iterator[Judgement]:
@@ -68,6 +66,9 @@ def _noise(results: Any) -> Judgement:
         levels.append(loudest(results.runup, marks))
         sentence += f". Loudest of the run-up: {levels[-1]}"
         resonance = _resonance(results.runup)
+    elif "modes" in results.stages:
+        line_words = f"order {order:g} at {hertz:,.0f} Hz"
+        resonance = resonance_of_line(line_words, hertz, results.modes["frequency"].values, share)
     # a bound has no mark: it is one itself
     codes = [*(["W-EXCITATION"] if any(map(is_bound, levels)) else []), *marks.codes]
     return judge_noise(answer, sentence, resonance, margins=margins, doubts=doubt_words(codes))
@@ -113,7 +114,7 @@ def _resonance(runup: Any) -> str:
         return ""
     alone, distance = runup["operating_alone"].values, runup["distance"].values
     level = np.interp(runup["operating_speed"].values, runup["speed"].values, runup["level"].values)
-    makes = np.where((np.abs(distance) <= _NEAR) & (alone >= _MAKES * level), alone / level, 0.0)
+    makes = np.where((np.abs(distance) <= NEAR_RESONANCE) & (alone >= MAKES_LEVEL * level), alone / level, 0.0)
     if not makes.any():
         return ""
     at = int(makes.argmax())

@@ -26,6 +26,7 @@ from femgear.stages.judgements import (
     lives_of_bearings,
     lives_of_teeth,
     margins_of_levels,
+    resonance_of_line,
     stresses_text,
 )
 from femgear.stages.key_figures import REFERENCE_ACCELERATION
@@ -167,17 +168,16 @@ def _noise(results: Any) -> Judgement:
     hertz = float(data["order"].values[line]) * speed / 60.0
     mode = "" if modes is None else near_mode(modes, hertz)
     near = f", near {mode}," if mode else ""
-    main = (
-        f"{line_origin(data, line)} at {hertz:,.0f} Hz{near} makes {0.5 * (size[line] / whole) ** 2:.0%} of the power"
-    )
-    sentence = f"At {speed:,.4g} rpm sensor {name} has {size_words}: {main}"
+    share, line_words = 0.5 * (size[line] / whole) ** 2, f"{line_origin(data, line)} at {hertz:,.0f} Hz"
+    sentence = f"At {speed:,.4g} rpm sensor {name} has {size_words}: {line_words}{near} makes {share:.0%} of the power"
+    resonance = "" if modes is None else resonance_of_line(line_words, hertz, modes["frequency"].values, share)
     if "path_share" in data:
         sentence += f"; most of it comes by {main_way(data, sensor)}"
     if "runup" in results.stages and "level" in results.runup:
         sentence += f". Loudest of the run-up: {_loudest_of_run_up(results.runup, marks, name)}"
     open_words = "give sensor.level_limit, or femgear compare sets two runs beside one another"
     margins = tuple(_margins(results))
-    return judge_noise(answer, sentence, open_words=open_words, margins=margins, doubts=doubt_words(marks.codes))
+    return judge_noise(answer, sentence, resonance, open_words, margins, doubt_words(marks.codes))
 
 
 def _marked(level: float, marks: Marks, stage: str) -> str:

@@ -53,6 +53,20 @@ def test_the_questions_of_a_gearbox_in_a_casing(results):
     assert f"most of it comes by {way} (" in sentence and "Loudest of the run-up: " in sentence
 
 
+def test_a_gearbox_whose_main_line_is_beside_a_mode_deserves_a_look(results):
+    data, beside = results.dynamics, Files(**vars(results))
+    size = np.hypot(data["lines_real"].values[0], data["lines_imag"].values[0])
+    sensor = int(data["level"].values[0].argmax())
+    line = int(size[sensor].argmax())
+    hertz = float(data["order"].values[line] * data["speed"].values[0] / 60.0)
+    assert 0.5 * (size[sensor, line] / data["level"].values[0, sensor]) ** 2 > 0.25
+    for factor, state, words in ((1.01, "look", f" at {hertz:,.0f} Hz, 1.0 % below mode "), (1.5, "open", "level_limit")):
+        count = results.modes.sizes["mode"]
+        beside.modes = _with(results.modes, frequency=np.r_[factor * hertz, np.full(count - 1, 9.0 * hertz)])
+        judged = {judgement.question: judgement for judgement in gearbox_judgements(beside)}[QUIET]
+        assert judged.state == state and words in judged.limit
+
+
 def test_a_silent_gearbox_is_said_to_be_silent(results):
     silent = Files(**vars(results))
     levels = np.zeros_like(results.dynamics["level"].values)
@@ -64,7 +78,8 @@ def test_a_silent_gearbox_is_said_to_be_silent(results):
 def with_limit(results, factor: float, change: float = 0.0, findings=()):
     """Answer to how loud it is, the limit being so many times the loudest level, which a longer excitation changes."""
     sensor = str(results.dynamics["sensor"].values[0])
-    limited = Files(**vars(results))
+    # without modes there is no resonance, which deserves a look below a limit too
+    limited = Files(**vars(results) | {"stages": ("dynamics", "runup")})
     highest = factor * max(float(data["level"].values[:, 0].max()) for data in (results.dynamics, results.runup))
     entries = ("strength", "pair", "planetary", "operation", "losses")
     limited.case = SimpleNamespace(
