@@ -60,7 +60,10 @@ def test_a_gearbox_whose_main_line_is_beside_a_mode_deserves_a_look(results):
     line = int(size[sensor].argmax())
     hertz = float(data["order"].values[line] * data["speed"].values[0] / 60.0)
     assert 0.5 * (size[sensor, line] / data["level"].values[0, sensor]) ** 2 > 0.25
-    for factor, state, words in ((1.01, "look", f" at {hertz:,.0f} Hz, 1.0 % below mode "), (1.5, "open", "level_limit")):
+    for factor, state, words in (
+        (1.01, "look", f" at {hertz:,.0f} Hz, 1.0 % below mode "),
+        (1.5, "open", "level_limit"),
+    ):
         count = results.modes.sizes["mode"]
         beside.modes = _with(results.modes, frequency=np.r_[factor * hertz, np.full(count - 1, 9.0 * hertz)])
         judged = {judgement.question: judgement for judgement in gearbox_judgements(beside)}[QUIET]
