@@ -548,7 +548,9 @@ def export_results(
         )
     _need_libraries(formats)
     if "csv" in formats:
-        files += [name for stage in results for name in write_csv_tables(results[stage], folder, stage)]
+        for number, stage in enumerate(results):
+            progress("csv", number, len(results.stages))
+            files += write_csv_tables(results[stage], folder, stage)
         if recorded is not None and recorded.cuts and {"runup", "housing"} <= {*results.stages}:
             header, rows = recorded.cuts(results, how.level)
             write_csv(folder / "order_cuts.csv", header, ([float(x) for x in row] for row in rows))
@@ -556,22 +558,29 @@ def export_results(
         for name, header, rows in recorded.tables(results) if recorded is not None else ():
             write_csv(folder / f"{name}.csv", header, rows)
             files.append(f"{name}.csv")
+        progress("csv", len(results.stages), len(results.stages))
     if "xlsx" in formats:
+        progress("xlsx", 0, 1)
         tables = (table for stage in results for table in tables_of(results[stage], stage))
         if long := write_workbook(tables, folder / "results.xlsx"):
             text = f"tables that no sheet can hold are left out: {', '.join(long)}"
             tell(Finding("W-ROWS", "", text, remedy="export them with --csv"))
         files.append("results.xlsx")
+        progress("xlsx", 1, 1)
     if "mat" in formats:
+        progress("mat", 0, 1)
         write_matlab({stage: results[stage] for stage in results}, folder / "results.mat")
         files.append("results.mat")
+        progress("mat", 1, 1)
     if recorded is not None and {"wav", "uff", "quality"} & {*formats}:
         how = _scaled(how, recorded.extent(results, how.rate))
     if recorded is not None and recorded.shapes and "uff" in formats:
+        progress("uff", 0, 1)
         signals = (signal for signal in recorded.signals(results, how) if signal.steady)
         write_functions(signals, recorded.spectra(results), folder / "signals.uff")
         write_modes(recorded.shapes(results), folder / "modes.uff")
         files += ["signals.uff", "modes.uff"]
+        progress("uff", 1, 1)
     if recorded is not None and not {"wav", "quality"}.isdisjoint(formats):
         steps = recorded.each(results) * (results[needs["wav"][0]].sizes["speed"] + ("runup" in results.stages))
         signals = _told(recorded.signals(results, how), progress, steps)

@@ -77,7 +77,7 @@ class Progress:
         while not self._ended.wait(SILENCE):
             done, total = self._done.get(self._now, (0.0, 1.0))
             share = f", {done:.5g} of {total:.5g}" if total > 1.0 else ""
-            self._console.print(f"{self._now}{share}, {time.monotonic() - self._start:.0f} s")
+            self._console.print(f"{self._now or 'working'}{share}, {time.monotonic() - self._start:.0f} s")
 
 
 def print_blocks(blocks) -> None:

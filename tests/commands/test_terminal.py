@@ -81,6 +81,13 @@ def test_progress_is_never_silent_for_long_in_a_file(monkeypatch, capsys):
     assert all(line.startswith("pictures, 3 of 11, ") and line.endswith(" s") for line in lines[1:])
 
 
+def test_progress_before_the_first_stage_has_a_name(monkeypatch, capsys):
+    monkeypatch.setattr(terminal, "SILENCE", 0.05)
+    with terminal.Progress():
+        time.sleep(0.2)
+    assert set(capsys.readouterr().err.splitlines()) == {"working, 0 s"}
+
+
 def test_a_run_is_told_in_few_lines_of_80_columns(monkeypatch, capsys):
     """The last rows of the longest table go; a note tells how many, before the other notes."""
 

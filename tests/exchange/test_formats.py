@@ -142,8 +142,12 @@ def test_progress_counts_the_signals(results, tmp_path):
 
 def test_order_cuts_are_written_in_the_level_that_is_asked_for(results, tmp_path):
     own_files(tmp_path / "a", ())
+    stages, told = len(results.stages), []
     for form, factor in (("m/s^2 rms", 1.0), ("m/s^2 peak", np.sqrt(2)), ("g peak", np.sqrt(2) / 9.80665)):
-        run.export_results(results, tmp_path / "a", ["csv"], Sampling(level=form))
+        told.clear()
+        sampling = Sampling(level=form)
+        run.export_results(results, tmp_path / "a", ["csv"], sampling, progress=lambda *one: told.append(one))
+        assert told == [("csv", done, stages) for done in range(stages + 1)]
         table = pd.read_csv(tmp_path / "a" / "order_cuts.csv")
         assert table["speed [rpm]"].to_numpy() == pytest.approx(results.runup["speed"].values)
         assert table.iloc[:, 1].to_numpy() == pytest.approx(factor * results.runup["level"].values, rel=1e-5)
