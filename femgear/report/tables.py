@@ -22,7 +22,7 @@ MANY = 8
 WARNINGS = "Warnings"
 """Title of the table of findings."""
 MARKS = "†‡§¶‖◊"
-"""Marks of doubtful numbers, in the order in which a table needs them."""
+"""Marks of doubtful numbers, in the order of the findings that they stand for."""
 RESPONSE_DOUBTS = "W-PULL", "W-CONVERGENCE", "W-UNSTABLE"
 """Findings of a periodic response that concern the numbers of the speeds at which they are."""
 _MODES = 16
@@ -114,8 +114,10 @@ class Marks:
     """Marks of the numbers of a table that findings of severity doubt or fault concern.
 
     ``marks(text, "W-PRESSURE")`` is the text of a number with a mark where the finding was raised, as in
-    "4573.4†"; `notes` tells under the table what the marks mean. A number of which only a bound is known, or
-    none at all, is written so by who writes it: ``marks.raised`` tells whether there is such a finding.
+    "4573.4†". The mark of a code follows from its place among the findings, so that one stands for the same in all
+    texts and tables of the same findings. `notes` tells under the table what the marks mean. A number of which only
+    a bound is known, or none at all, is written so by who writes it: ``marks.raised`` tells whether there is such a
+    finding.
 
     Parameters
     ----------
@@ -128,7 +130,8 @@ class Marks:
         for finding in findings:
             if finding.severity != NOTE:
                 self._known.setdefault(finding.code, []).append(finding)
-        self._used = dict[str, str]()
+        self._marks = {code: MARKS[n % len(MARKS)] * (n // len(MARKS) + 1) for n, code in enumerate(self._known)}
+        self._used = set[str]()
 
     def raised(self, *codes: str, of: tuple[str, ...] = ()) -> bool:
         """Tell whether one of some findings was raised, by the case, or by the stages ``of`` if given."""
@@ -142,22 +145,22 @@ class Marks:
         """
         if not text.strip("-"):
             return text
-        raised = [code for code in dict.fromkeys(codes) if self.raised(code, of=of)]
-        for code in raised:
-            repeats, number = divmod(len(self._used), len(MARKS))
-            self._used.setdefault(code, MARKS[number] * (repeats + 1))
-        return text + "".join(self._used[code] for code in raised)
+        raised = [code for code in self._known if code in codes and self.raised(code, of=of)]
+        self._used.update(raised)
+        return text + "".join(self._marks[code] for code in raised)
 
     @property
     def codes(self) -> tuple[str, ...]:
         """The marks that were used with their codes, where there is no room for `notes`."""
-        return tuple(f"{mark} {code}" for code, mark in self._used.items())
+        return tuple(f"{mark} {code}" for code, mark in self._marks.items() if code in self._used)
 
     @property
     def notes(self) -> tuple[str, ...]:
         """What the marks that were used mean."""
         return tuple(
-            f"{mark} {code}, {self._known[code][0].severity}: {CATALOGUE[code][1]}" for code, mark in self._used.items()
+            f"{mark} {code}, {self._known[code][0].severity}: {CATALOGUE[code][1]}"
+            for code, mark in self._marks.items()
+            if code in self._used
         )
 
 

@@ -1054,7 +1054,7 @@ def describe_stress(data: xr.Dataset, findings: Iterable[Finding] = ()) -> Block
     One row for the contact and one for the root of every kind of gear, each of its worst mesh. Marked are
     those that doubts of the file, and ``findings`` of the run, concern.
     """
-    findings = (*findings_in(data.attrs), *findings)
+    findings = (*findings, *findings_in(data.attrs))
     marks = Marks(findings)
     names = [str(name) for name in data["mesh"].values]
     contact, roots = [], []

@@ -23,6 +23,14 @@ def test_every_finding_of_a_table_has_a_mark_of_its_own():
     assert found == [marks("1", code) for code in codes] and len(marks.notes) == 20
 
 
+def test_a_mark_stands_for_the_same_in_all_texts_of_the_same_findings():
+    findings = [Finding(code, "", "text", severity="doubt") for code in ("W-FACE-LOAD", "W-TAIL", "W-CROSS")]
+    sentence, table = Marks(findings), Marks(findings)
+    assert sentence("4.2", "W-CROSS", "W-TAIL") == "4.2‡§" and sentence.codes == ("‡ W-TAIL", "§ W-CROSS")
+    assert [table("1", finding.code) for finding in findings] == ["1†", "1‡", "1§"]
+    assert [note[0] for note in table.notes] == ["†", "‡", "§"]
+
+
 @pytest.mark.parametrize(
     ("value", "text"),
     [
