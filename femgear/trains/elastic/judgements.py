@@ -57,7 +57,9 @@ def _noise(results: Any) -> Judgement:
     hertz = order * carrier / (2.0 * np.pi)
     share = 0.5 * (size[line] / level[at]) ** 2 if level[at] > 0.0 else 0.0
     origin = _origin(round(order), results.case.ring.teeth)
-    main = f"order {order:g} ({origin}{hertz:,.0f} Hz{_nearest_mode(results, hertz)}) makes {share:.0%} of the power"
+    line_words = f"order {order:g} of the carrier"
+    place = f"{origin}{hertz:,.0f} Hz{_nearest_mode(results, hertz)}"
+    main = f"its largest line, {line_words} ({place}), makes {share:.0%} of the power"
     sentence = f"At {speed:,.4g} rpm the housing has {size_words}: {main}"
     if decisive := most_decisive(results):
         sentence += f", with half and twice of what is assumed: {decisive}"
@@ -67,7 +69,7 @@ def _noise(results: Any) -> Judgement:
         sentence += f". Loudest of the run-up: {levels[-1]}"
         resonance = _resonance(results.runup)
     elif "modes" in results.stages:
-        line_words = f"order {order:g} at {hertz:,.0f} Hz"
+        line_words += f" at {hertz:,.0f} Hz"
         resonance = resonance_of_line(line_words, hertz, results.modes["frequency"].values, share)
     # a bound has no mark: it is one itself
     codes = [*(["W-EXCITATION"] if any(map(is_bound, levels)) else []), *marks.codes]
@@ -109,7 +111,10 @@ def _nearest_mode(results: Any, hertz: float) -> str:
 
 
 def _resonance(runup: Any) -> str:
-    """Write the resonance that makes most of the level at a speed of operation; empty where none does."""
+    """Write the resonance that makes most of the level at a speed of operation; empty where none does.
+
+    It is of all lines of a mesh harmonic: its share may be more than that of the largest line, of another harmonic.
+    """
     if "operating_alone" not in runup:
         return ""
     alone, distance = runup["operating_alone"].values, runup["distance"].values
@@ -122,4 +127,5 @@ def _resonance(runup: Any) -> str:
     speed, side = float(runup["operating_speed"].values[at]), "below" if distance[at] < 0.0 else "above"
     meeting = f"mode {mode} meets mesh harmonic {harmonic}, {abs(distance[at]):.1f} % {side} {speed:,.4g} rpm"
     share = float(makes[at]) ** 2
-    return f"{meeting}: alone {f'{share:.0%} of the power' if share < 1.0 else 'as loud as all'}"
+    power = f"{share:.0%} of the power" if share < 1.0 else "as loud as all lines"
+    return f"{meeting}: all lines of that harmonic by that mode are {power}"
