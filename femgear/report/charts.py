@@ -204,6 +204,9 @@ def _curve(line, ax: Axes) -> dict[str, Any]:
     across = _across(line.get_transform(), ax)
     if across:
         return {**trace, **_spread(x, y, across, ax), **_name(line), "hoverinfo": "skip"}
+    if not len(x):
+        # plotly.js leaves a curve without points out of the legend, which it may be drawn for
+        x = y = np.array([np.nan])
     return {**trace, **_coordinates(x, y, ax), **_name(line)}
 
 

@@ -211,3 +211,8 @@ def test_rounding_takes_no_word_beyond_the_end_of_its_axis():
 
     there, beyond = panel(draw)["words"]
     assert there["x"] == end and beyond["x"] == 1501.0
+
+
+def test_a_curve_that_is_drawn_for_the_legend_alone_has_a_point_that_is_nowhere():
+    (trace,) = panel(lambda ax: ax.plot([], [], label="second gear"))["traces"]
+    assert trace["name"] == "second gear" and trace["x"] == trace["y"] == [None]
