@@ -66,7 +66,10 @@ def judged(results):
 
 def test_the_main_line_is_that_of_the_acceleration_with_its_mode(results):
     noise = judged(results)
-    assert "its largest line, order 216 of the carrier (mesh harmonic 2, 2,160 Hz, mode 2: ring), makes 80% of" in noise.sentence
+    assert (
+        "its largest line, order 216 of the carrier (mesh harmonic 2, 2,160 Hz, mode 2: ring), makes 80% of"
+        in noise.sentence
+    )
     assert noise.sentence.endswith("Loudest of the run-up: 9 m/s² at 4000 rpm, the end of its range")
     assert noise.answer == "3.162 m/s² at 3,000 rpm"
 
