@@ -9,15 +9,26 @@ import numpy as np
 
 NEAR = 0.2
 """Distance over the frequency of a line up to which a mode is near it."""
+MESH_LINES = 3
+"""Harmonics of every mesh frequency in the Campbell diagram, which are compared with modes; higher ones crowd."""
 
 
 def mode_distance(data: Any) -> float:
     """Compute how far the mesh line nearest to a mode is from it, over the frequency of the mode; of modes.nc."""
+    _, line, mode = nearest_mesh_line(data)
+    return abs(line / mode - 1.0)
+
+
+def nearest_mesh_line(data: Any) -> tuple[str, float, float]:
+    """Find the mesh line of modes.nc that is nearest to a mode: its name, its frequency and that of the mode [Hz].
+
+    Up to harmonic `MESH_LINES`; without lines or modes the name is empty, the frequencies are NaN.
+    """
     apart, lines, modes = mesh_lines_and_modes(data)
     if not apart.size:
-        return math.nan
+        return "", math.nan, math.nan
     line, mode = np.unravel_index(int(apart.argmin()), apart.shape)
-    return float(abs(lines[line][1] / modes[mode] - 1.0))
+    return *lines[line], float(modes[mode])
 
 
 def mesh_lines_and_modes(data: Any) -> tuple[np.ndarray, list[tuple[str, float]], np.ndarray]:

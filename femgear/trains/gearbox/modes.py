@@ -22,6 +22,7 @@ from femgear.trains.gearbox.deflection import Deflection, laws_of
 from femgear.trains.gearbox.elastic_carrier import with_carriers
 from femgear.trains.gearbox.elastic_ring import elastic_rings, with_rings
 from femgear.trains.gearbox.entry_checks import check_shafts_have_mass
+from femgear.trains.gearbox.mode_words import MESH_LINES
 from femgear.trains.gearbox.model import GearboxModel, StageModel, member_of_stations
 from femgear.trains.gearbox.sensors import gearbox_sensors, sensor_rows
 
@@ -33,8 +34,6 @@ _MOST_BRANCHES = 40
 _LEAST = 20
 # Modes at rest on which one of the Campbell diagram is followed.
 _BASIS = 2
-# Reach of the Campbell diagram and of the modes that are kept, over the highest mesh frequency.
-_HARMONICS = 3.0
 # Reach of the inner modes of elastic carriers, over that of the modes.
 _REACH = 2.0
 # Share of the largest slice force below which a slice carries nothing but rounding.
@@ -152,7 +151,7 @@ def solve_gearbox_modes(state: Deflection, *, steps: Steps | None = None) -> Gea
     model, case = state.model, state.model.case
     assembly, system, stiffness = linear_system(state)
     frequencies = [hertz for hertz in model.flow.mesh_frequency.values() if hertz]
-    top = case.modes.up_to or (_HARMONICS * max(frequencies) if frequencies else None)
+    top = case.modes.up_to or (MESH_LINES * max(frequencies) if frequencies else None)
     rings = elastic_rings(model, steps=steps)
     system, stiffness = with_rings(system, stiffness, assembly, dict(enumerate(assembly.slices)), rings)
     carriers = [stage.elastic_carrier for stage in model.stages if stage.elastic_carrier is not None]
@@ -249,7 +248,7 @@ def count_modes(system: MechanicalSystem, stiffness: np.ndarray, top: float | No
 
 
 def excitation_orders(model: GearboxModel, reference: str) -> dict[str, float]:
-    """List turns of shafts and mesh lines of stages over the turn of a shaft, equal ones once."""
+    """List turns of shafts and `MESH_LINES` mesh lines of stages over the turn of a shaft, equal ones once."""
     speed = abs(model.flow.speed[reference])
     orders: dict[str, float] = {}
     if not speed:
@@ -257,7 +256,8 @@ def excitation_orders(model: GearboxModel, reference: str) -> dict[str, float]:
     lines = [(f"{name} turn", abs(value) / speed) for name, value in model.flow.speed.items()]
     for name, hertz in model.flow.mesh_frequency.items():
         order = 2.0 * np.pi * hertz / speed
-        lines += [(f"{name} mesh" if h == 1 else f"{h} x {name} mesh", h * order) for h in (1, 2, 3)]
+        lines += [(f"{name} mesh", order)]
+        lines += [(f"harmonic {h} of {name} mesh", h * order) for h in range(2, MESH_LINES + 1)]
     for name, order in lines:
         if order > 0.0 and all(abs(order - other) > 1e-9 * order for other in orders.values()):
             orders[name] = order

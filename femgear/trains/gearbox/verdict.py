@@ -20,7 +20,7 @@ from femgear.stages.losses_results import efficiency_rows
 from femgear.stages.planet_bearings import planet_bearing_rows
 from femgear.trains.gearbox.casing_results import largest_foot_force
 from femgear.trains.gearbox.life import shortest_life
-from femgear.trains.gearbox.mode_words import mesh_lines_and_modes, near_mode, nearest_mode
+from femgear.trains.gearbox.mode_words import MESH_LINES, near_mode, nearest_mesh_line, nearest_mode
 from femgear.trains.gearbox.response_results import OF_BOX_RESPONSE, SENSORS_JUDGED, line_origin, main_way
 from femgear.trains.gearbox.strength import smallest_safeties
 from femgear.trains.gearbox.stress import box_reason_rows
@@ -102,12 +102,11 @@ def _worst_of_deflection(data: Any, marks: Marks) -> Iterator[tuple[str, str]]:
 
 def _nearest_mode(data: Any) -> Iterator[tuple[str, str]]:
     """The mode that a mesh line comes nearest at the speed of operation."""
-    apart, lines, modes = mesh_lines_and_modes(data)
-    if not apart.size:
-        return
-    line, mode = np.unravel_index(int(apart.argmin()), apart.shape)
-    name, hertz = lines[line]
-    yield "mesh line nearest to a mode", f"{name} {hertz:.0f} Hz, {nearest_mode(data, float(modes[mode]))}"
+    name, line, mode = nearest_mesh_line(data)
+    if name:
+        apart = f"{100.0 * abs(line / mode - 1.0):.3g} % {'below' if line < mode else 'above'}"
+        text = f"{name}, {line:.0f} Hz, {apart} {nearest_mode(data, mode)}"
+        yield f"mesh line up to harmonic {MESH_LINES} nearest to a mode", text
 
 
 def level_text(level: float) -> str:

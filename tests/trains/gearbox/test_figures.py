@@ -96,7 +96,7 @@ def test_the_campbell_diagram_has_modes_by_kind_lines_by_name_and_the_speed_of_o
     ax = gearbox_campbell(data[1]).axes[0]
     names = {line.get_label() for line in ax.lines}
     assert {"bending", "axial", "critical speed", "speed of operation"} <= names
-    assert {"2 x stage mesh", "3 x stage mesh"} <= {text.get_text() for text in ax.texts}
+    assert {"harmonic 2 of stage mesh", "harmonic 3 of stage mesh"} <= {text.get_text() for text in ax.texts}
     operation = next(line for line in ax.lines if line.get_label() == "speed of operation")
     assert operation.get_xdata() == pytest.approx([1000.0, 1000.0])
     assert ax.get_xlabel() == "speed of input [rpm]"

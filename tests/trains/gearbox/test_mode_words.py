@@ -1,9 +1,17 @@
 """Which mode is nearest to a line, and how far it is."""
 
+import math
+
 import pytest
 
 from femgear.storage.contents import Contents
-from femgear.trains.gearbox.mode_words import mesh_lines_and_modes, mode_distance, near_mode, nearest_mode
+from femgear.trains.gearbox.mode_words import (
+    mesh_lines_and_modes,
+    mode_distance,
+    near_mode,
+    nearest_mesh_line,
+    nearest_mode,
+)
 
 
 @pytest.fixture(scope="module")
@@ -13,7 +21,7 @@ def modes():
         "frequency": [0.0, 5.0, 10.4, 19.9, 80.0],
         "kind": ["rigid", "axial", "casing", "bending", "mixed"],
         "main_member": ["rotor", "rotor", "casing", "rotor", "output"],
-        "line": ["stage mesh", "2 x stage mesh", "shaft rotor"],
+        "line": ["stage mesh", "harmonic 2 of stage mesh", "shaft rotor"],
         "order": [10.0, 20.0, 5.0],
     }
 
@@ -39,3 +47,10 @@ def test_distance_is_that_of_the_mesh_line_nearest_to_an_elastic_mode(modes):
     _, lines, elastic = mesh_lines_and_modes(modes)
     assert [hertz for _, hertz in lines] == [10.0, 20.0] and len(elastic) == 4
     assert mode_distance(modes) == pytest.approx(20.0 / 19.9 - 1.0)
+    assert nearest_mesh_line(modes) == ("harmonic 2 of stage mesh", 20.0, 19.9)
+
+
+def test_without_an_elastic_mode_no_mesh_line_is_nearest():
+    entries = {"frequency": ("mode", [0.0]), "line": ("line", ["stage mesh"]), "order": ("line", [10.0])}
+    still = Contents({name: (*entry, "1", name) for name, entry in entries.items()}, {}, {"speed": 60.0})
+    assert nearest_mesh_line(still)[0] == "" and math.isnan(mode_distance(still))

@@ -53,8 +53,8 @@ def test_lines_of_turns_and_meshes(found):
             "input turn": 1.0,
             "output turn": 2.0 / 3.0,
             "stage mesh": 24.0,
-            "2 x stage mesh": 48.0,
-            "3 x stage mesh": 72.0,
+            "harmonic 2 of stage mesh": 48.0,
+            "harmonic 3 of stage mesh": 72.0,
         }
     )
 
