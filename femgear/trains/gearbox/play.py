@@ -1,12 +1,15 @@
-"""Shafts that float in the play of their bearings: motions that the loaded state leaves free.
+"""Shafts that float in the play of their bearings, and planets beyond the play of their teeth.
 
 A bearing with clearance holds what its loaded elements hold, one of a single axial sense what thrust presses into it.
 Where neither load nor weight nor preload presses a shaft into its bearings, nothing holds it there, and its modes are
 rigid ones. Meshes count with their whole stiffness.
+
+Springs of meshes press on one side. Errors that take planets off a mesh by more than its play press the other side.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from dataclasses import replace
 from typing import TYPE_CHECKING
@@ -14,15 +17,21 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from femgear.findings import Finding
-from femgear.trains.gearbox.case_file import named_load_case
+from femgear.trains.gearbox.case_file import PairSection, named_load_case
 from femgear.trains.gearbox.casing import called
 from femgear.trains.gearbox.deflection import LEVERS, Deflection, laws_of, spread_rows
+from femgear.trains.gearbox.model import StageModel
+from femgear.trains.gearbox.nonlinear import normal_backlash
+from femgear.trains.gearbox.planet_branches import running_sets
+from femgear.trains.gearbox.planet_errors import error_gaps
 
 if TYPE_CHECKING:
     import xarray as xr
 
 # Eigenvalue over the largest one below which a motion has no stiffness, and motions that are none over the largest.
 _FREE, _STILL = 1e-10, 1e-3
+# Mesh force over the largest one of its set up to which it is none.
+_NONE = 1e-9
 _WAYS = {"across": (0, 1), "along z": (2,), "against tilting": (3, 4)}
 _MOST_NAMED = 12
 
@@ -110,3 +119,40 @@ def loose_notes(data: xr.Dataset) -> Iterator[str]:
         yield f"{called('bearing', name)} carries {force}" + (
             f", {loose:.1%} of the time nothing" if 0.0 < loose < 1.0 else ""
         )
+
+
+def beyond_play(state: Deflection) -> np.ndarray:
+    """Find how far errors take branches of planets that carry nothing beyond the play of their teeth [m].
+
+    The flanks of such a branch stand apart, and its planets turn freely between both flanks: with the mesh forces F of
+    the other branches, in balance on all its planets, the way left is the sum of F times opening less play, over the
+    largest F. Above zero its teeth would press on their back flanks, which no force of the state knows.
+
+    Returns
+    -------
+    (stages,) array
+        Of the pairs of such branches, negative within their play; NaN of all others, and where play is not known.
+    """
+    model, force, beyond = state.model, state.mesh_force, np.full(len(state.model.stages), np.nan)
+    places = {stage.name: place for place, stage in enumerate(model.stages)}
+    gap = error_gaps(model) - model.assembly.columns.T @ state.motion
+    opening = np.array([gap[part].mean() for part in model.assembly.slices])
+    for running in running_sets(model.case):
+        pairs = np.array([[places[name] for name in names] for names in running.kinds])
+        meshes = np.array([stage.meshes[0] for stage in model.stages])[pairs]
+        play = np.array([[_play_of_teeth(model.stages[place]) for place in row] for row in pairs])
+        idle = (force[meshes] <= _NONE * force[meshes].max()).all(axis=0)
+        if not idle.any() or idle.all() or np.isnan(play).any():
+            continue
+        of_others = force[meshes][:, ~idle].mean(axis=1)
+        for branch in np.flatnonzero(idle):
+            beyond[pairs[:, branch]] = of_others @ (opening[meshes] - play)[:, branch] / of_others.max()
+    return beyond
+
+
+def _play_of_teeth(stage: StageModel) -> float:
+    """Play of the mesh of a pair along its normal [m]; NaN where it is not known."""
+    section = stage.section
+    assert isinstance(section, PairSection)
+    known = section.teeth is not None or (section.mesh is not None and section.mesh.backlash is not None)
+    return float(normal_backlash(stage)[0]) if known else math.nan

@@ -48,7 +48,7 @@ from femgear.trains.gearbox.model import (
 from femgear.trains.gearbox.modes import GearboxModes
 from femgear.trains.gearbox.overlaps import common_faces, overlaps
 from femgear.trains.gearbox.planet_shafts import standing_planets
-from femgear.trains.gearbox.play import play_findings, slack_bearings
+from femgear.trains.gearbox.play import beyond_play, play_findings, slack_bearings
 from femgear.trains.gearbox.sensors import (
     describe_sensors,
     modal_sensor_variables,
@@ -69,6 +69,8 @@ ESTIMATES = 0.5, 2.0
 """Factors on the stiffness of estimated bearings between which results are shown."""
 # Force of a mesh over the largest one of its set up to which it is none.
 _IDLE = 1e-9
+# Way beyond the play of teeth that is rounding [m].
+_LEAST_WAY = 1e-12
 # Line loads whose sum over the slices is rounding [N/m].
 _LEAST_LOAD = 1e-3
 # Tilt up to which motions are small [rad].
@@ -145,6 +147,12 @@ class DeflectionResult(StageResult):
                 [[_planet_factor(solved, stage) for stage in solved.model.stages] for solved in every],
                 "1",
                 "K_gamma: largest load of the planets over their mean; NaN of pairs without planets",
+            ),
+            "beyond_play": (
+                "load_case stage",
+                np.array([beyond_play(solved) for solved in every]),
+                "m",
+                "way by which errors take teeth of branches of planets without load beyond their play; NaN of others",
             ),
             "share": (load_case, running_shares(case.operation.load_case), "1", "share of the running time"),
             "mesh_force": (mesh, [solved.mesh_force for solved in every], "N", "force along the normal of the flanks"),
@@ -543,6 +551,21 @@ def _idle_planets(data: xr.Dataset) -> Iterator[Finding]:
                 text = f"{', '.join(idle)} carry nothing in {named_load_case(str(data['load_case'].values[case]))}"
                 remedy = "smaller errors of pins and timing, or members that give way"
                 yield Finding("W-OPEN", "operation.load_case", text, remedy=remedy)
+    yield from _wedged(data, "smaller errors of pins and timing, or more backlash")
+
+
+def _wedged(data: xr.Dataset, remedy: str) -> Iterator[Finding]:
+    """Name branches of planets whose errors are larger than the play of their teeth (W-WEDGING)."""
+    for case, beyond in enumerate(data["beyond_play"].values):
+        wedged = beyond > _LEAST_WAY
+        if wedged.any():
+            names = ", ".join(map(str, data["stage"].values[wedged]))
+            text = (
+                f"{names} would press on their back flanks in {named_load_case(str(data['load_case'].values[case]))}: "
+                f"errors take them {1e6 * beyond[wedged].max():.3g} um beyond their play, and no force here knows"
+            )
+            limit = "play of 0 um or more"
+            yield Finding("W-WEDGING", "operation.load_case", text, remedy=remedy, limit=limit, severity=FAULT)
 
 
 def _large(data: xr.Dataset) -> Iterator[Finding]:

@@ -1,11 +1,15 @@
 """Shafts that float in their bearings: which bearings are named, and what modes that makes."""
 
+import math
+
 import numpy as np
 import pytest
+from planet_gearboxes import STEPPED, held, stepped_set
 from small_gearbox import pair_tables
 
-from femgear.trains.gearbox.play import play_findings, slack_bearings, unheld_motions
-from femgear.trains.gearbox.results import deflection_warnings
+from femgear.trains.gearbox.deflection import solve_deflection
+from femgear.trains.gearbox.play import beyond_play, play_findings, slack_bearings, unheld_motions
+from femgear.trains.gearbox.results import DeflectionResult, deflection_warnings
 from femgear.trains.gearbox.stages import solve_box_modes, solve_deflections
 from femgear.trains.reading import read_case
 
@@ -76,3 +80,30 @@ def test_every_load_case_is_told_for_itself():
     (found,) = play_findings(data)
     assert (found.code, found.key) == ("W-PLAY", "bearing") and "load case idle" in found.text
     assert np.array_equal(data["slack"].values.any(axis=(1, 2)), [False, True])
+
+
+@pytest.mark.parametrize(("play", "wedged"), [("20 um", True), ("80 um", False)])
+def test_errors_beyond_the_play_of_a_branch_are_told(play, wedged):
+    """Between members that turn alone a branch is ahead of two others by its error less their approach."""
+    tables, error, lever = held(stepped_set()), 2e-3, STEPPED[1] / STEPPED[2]
+    tables["pair"][4]["timing_error"] = f"{error!r} rad"
+    for pair in tables["pair"]:
+        pair["mesh"]["backlash"] = play
+    case = read_case(tables)
+    base = 1e-3 * math.cos(math.radians(20.0)) * np.array(STEPPED)
+    approach = 100.0 / (2.0 * base[0]) * (1.0 / 4e8 + lever**2 / 3e8)
+    left = error * base[2] * lever - approach - float(play.split()[0]) * 1e-6 * (1.0 + lever)
+    state = solve_deflection(case)
+    expected = np.full(6, np.nan)
+    expected[[1, 4]] = left / max(1.0, lever)
+    assert beyond_play(state) == pytest.approx(expected, rel=1e-9, nan_ok=True)
+    found = DeflectionResult(case, (state,), 0).dataset()
+    assert [finding.code for finding in deflection_warnings(found) if finding.code == "W-WEDGING"] == [
+        "W-WEDGING"
+    ] * wedged
+
+
+def test_branches_whose_play_is_not_known_say_nothing_of_it():
+    tables = held(stepped_set())
+    tables["pair"][4]["timing_error"] = "2e-3 rad"
+    assert np.isnan(beyond_play(solve_deflection(read_case(tables)))).all()
