@@ -154,5 +154,5 @@ def _play_of_teeth(stage: StageModel) -> float:
     """Play of the mesh of a pair along its normal [m]; NaN where it is not known."""
     section = stage.section
     assert isinstance(section, PairSection)
-    known = section.teeth is not None or (section.mesh is not None and section.mesh.backlash is not None)
-    return float(normal_backlash(stage)[0]) if known else math.nan
+    has_play = section.teeth is not None or (section.mesh is not None and section.mesh.backlash is not None)
+    return float(normal_backlash(stage)[0]) if has_play else math.nan
