@@ -49,6 +49,14 @@ class HeardSet:
         """As `femgear.housing.orders.classify_line` takes them."""
         return self.ring, self.sun, self.planet
 
+    def whole_orders(self, highest: float) -> np.ndarray:
+        """Find whole orders (n,) from those near the first mesh harmonic to a highest, at which faults have lines too.
+
+        Those of a healthy set, which the symmetry of the spacing allows, come twice.
+        """
+        orders = np.arange(max(self.ring - _BESIDE, 1), int(highest) + 1)
+        return np.concatenate([orders, orders[orders % spacing_symmetry(self.angles) == 0]])
+
     def symmetric_orders(self, harmonics: int) -> np.ndarray:
         """Find orders (n,) near the first mesh harmonics that the symmetry of the spacing allows, ascending."""
         symmetry, beside = spacing_symmetry(self.angles), np.arange(-_BESIDE, _BESIDE + 1)

@@ -157,13 +157,12 @@ def _carrier_speed(signal: Channel, recording: Recording, shafts: HeardSet) -> f
     orders = orders[orders * speed < signal.rate / 3]
     if len(orders) < 2:
         return speed
+    further = shafts.whole_orders(signal.rate / (3 * speed))
     if recording.within is not None:
-        near = aligned_speed(signal, speed, orders, recording.within)
-        _tell_drift(signal, near, orders, recording.within)
-        # high orders tell the speed finer, as soon as it is near enough for the right ones of them
-        every = shafts.symmetric_orders(harmonics=max(int(signal.rate / (3 * near * shafts.ring)), 1))
-        return aligned_speed(signal, near, every, min(recording.within, widest_range(every)))
-    best = aligned_speed(signal, speed, orders, widest_range(orders))
+        best = aligned_speed(signal, speed, orders, recording.within, further=further)
+        _tell_drift(signal, best, orders, further, recording.within)
+        return best
+    best = aligned_speed(signal, speed, orders, widest_range(orders), further=further)
     if abs(best / speed - 1.0) * shafts.ring > _OFF:
         rpm = 60.0 / shafts.carrier_per_turn[shafts.input]
         words = f"lines stand best on orders of the set at {best * rpm:.6g} rpm, not at {speed * rpm:.6g} rpm"
@@ -175,11 +174,12 @@ def _carrier_speed(signal: Channel, recording: Recording, shafts: HeardSet) -> f
     return speed
 
 
-def _tell_drift(signal: Channel, speed: float, orders: np.ndarray, within: float) -> None:
+def _tell_drift(signal: Channel, speed: float, orders: np.ndarray, further: np.ndarray, within: float) -> None:
     """Say where the speeds of both halves of a recording smear its lines over more than a step of orders."""
     half = len(signal.values) // 2
     halves = [replace(signal, values=part) for part in (signal.values[:half], signal.values[half:])]
-    first, second = (aligned_speed(part, speed, orders, min(within, widest_range(orders))) for part in halves)
+    within = min(within, widest_range(orders))
+    first, second = (aligned_speed(part, speed, orders, within, further=further) for part in halves)
     smeared = abs(first - second) / speed * float(orders[-1])
     if smeared > 1.0 / (signal.duration * speed):
         words = f"from the first half to the second the speed changes by {abs(second / first - 1):.2%}, and order "

@@ -189,11 +189,17 @@ def widest_range(orders: np.ndarray) -> float:
     return 0.4 * float(np.diff(np.unique(orders)).min()) / float(orders.max())
 
 
-def aligned_speed(channel: Channel, speed: float, orders: np.ndarray, within: float) -> float:
+def aligned_speed(
+    channel: Channel, speed: float, orders: np.ndarray, within: float, *, further: np.ndarray | None = None
+) -> float:
     """Find the constant speed near a nominal one [1/s] at which lines of a signal stand best at some orders.
 
-    That of the largest sum of squares of the spectrum (Hann window) at the orders. It is a guess as good as the
-    speed was constant; pulses are better. CaseError: E-RANGE: a range within which the next lines would fit as well.
+    That of the largest sum of amplitudes of the spectrum (Hann window) at the orders and at further ones; in a sum of
+    squares a single line from elsewhere may decide. At another speed loud lines of a fault may stand at orders of a
+    healthy set, but never most lines at whole orders. It is a guess as good as the speed was constant; pulses are
+    better.
+
+    CaseError: E-RANGE: a range within which the next lines would fit as well.
 
     Parameters
     ----------
@@ -201,18 +207,22 @@ def aligned_speed(channel: Channel, speed: float, orders: np.ndarray, within: fl
         Orders of the shaft at which lines are expected, two of them apart by g at least.
     within : float
         Largest share of the nominal speed that the speed may differ by.
+    further : (m,) array, optional
+        Orders at which lines may stand too; those that come twice count twice.
     """
     most = widest_range(orders)
     if not 0.0 < within <= 1.0001 * most:
         message, remedy = "lines next to one another would fit as well", "measure the speed, or record its pulses"
         raise CaseError(message, code="E-RANGE", key="--within", value=within, limit=f"{most:.3g}", remedy=remedy)
     values = (channel.values - channel.values.mean()) * np.hanning(len(channel.values))
-    power = np.abs(np.fft.rfft(values, 2 * len(values))) ** 2  # twice as fine, so that no line lies between
+    height = np.abs(np.fft.rfft(values, 2 * len(values)))  # twice as fine, so that no line lies between
     step = channel.rate / (2 * len(values))
-    count = int(np.ceil(within * speed * float(orders.max()) / (0.5 * step)))
-    speeds = speed * (1.0 + within * np.arange(-count, count + 1) / count)
-    place = np.rint(np.multiply.outer(speeds, orders) / step).astype(int)
-    score = np.where(place < len(power), power[np.minimum(place, len(power) - 1)], 0.0).sum(axis=1)
+    counted = orders if further is None else np.concatenate([orders, further])
+    count = int(np.ceil(within * speed * float(counted.max()) / (0.5 * step)))
+    speeds, score = speed * (1.0 + within * np.arange(-count, count + 1) / count), np.zeros(2 * count + 1)
+    for order in counted.tolist():
+        place = np.rint(speeds * order / step).astype(int)
+        score += np.where(place < len(height), height[np.minimum(place, len(height) - 1)], 0.0)
     return float(speeds[score.argmax()])
 
 

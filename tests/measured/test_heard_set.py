@@ -17,6 +17,7 @@ def test_the_reference_set():
     heard = heard_set(read_case(CASES / "planetary_27_40_108.toml"))
     assert heard.teeth == (108, 27, 40) and np.allclose(np.degrees(heard.angles), [0, 120, 240])
     assert heard.input == "sun" and heard.carrier_per_turn == pytest.approx({"sun": 0.2, "carrier": 1.0})
+    assert heard.whole_orders(106.5).tolist() == [102, 103, 104, 105, 106, 102, 105]
     assert heard.symmetric_orders(2).tolist() == [102, 105, 108, 111, 114, 210, 213, 216, 219, 222]
 
 

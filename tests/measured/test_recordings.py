@@ -69,6 +69,26 @@ def test_a_constant_speed_that_is_none_is_told(speed, within, wander, words, tmp
         assert over_angle.speed == pytest.approx(speed if within else 3.0, rel=1e-3)
 
 
+@pytest.mark.parametrize("within", [None, 0.003])
+@pytest.mark.parametrize("nominal", [900.0, 899.0])
+def test_loud_lines_of_a_fault_do_not_shift_a_speed(nominal, within, tmp_path, recwarn):
+    """A sun of unequal teeth makes all whole orders, two thirds of them no multiples of three and louder than those."""
+    seconds, rate = 8.0, 6400.0
+    time, order = np.arange(int(seconds * rate)) / rate, np.arange(90, 700)
+    height = np.choose(order % 3, [0.1, 1.0, 0.3]) * (order / 330) ** 2
+    signal = sum(a * np.cos(2 * np.pi * n * 3.0 * time + n * n) for n, a in zip(order.tolist(), height.tolist()))
+    wavfile.write(tmp_path / "a.wav", int(rate), signal.astype(np.float32))
+    over_angle = read_by_turns(tmp_path / "a.wav", Recording(speed=f"{nominal} rpm", within=within), HEARD)
+    # the mean speed is that over whole turns less a sample
+    assert over_angle.speed == pytest.approx(3.0 if within else nominal / 300, rel=5e-5)
+    stated = [str(warning.message) for warning in recwarn]
+    if within or nominal == 900.0:
+        assert stated == []
+    else:
+        found = re.search(r"stand best on orders of the set at ([\d.]+) rpm", stated[0])
+        assert found and float(found[1]) == pytest.approx(900.0, rel=5e-5)
+
+
 @pytest.mark.parametrize("carrier", [3.006, 3.0126])
 def test_a_range_that_is_advised_is_allowed(carrier, tmp_path, recwarn):
     signal, _, _ = recording(HEALTHY, HEALTHY.values(), seconds=6.0, carrier=carrier)
