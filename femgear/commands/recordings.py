@@ -99,12 +99,15 @@ def faults(
     from femgear.trains.reading import read_case
 
     data = read_case(case)
+    parts = request or FaultRequest(), tolerances, further or FurtherRecords()
+    if output is None and parts != (FaultRequest(), None, FurtherRecords()):
+        message, remedy = "records are asked for, and no folder is named", "name one by -o"
+        raise CaseError(message, code="E-ARGUMENTS", key="--output", remedy=remedy)
     print_blocks(describe_fault_orders(data))
     if output is None:
         return 0
     with open_runner(**vars(tasks or Tasks())) as runner, Progress() as progress:
         options = {"cache": grid_cache(), "progress": progress, "runner": runner}
-        parts = request or FaultRequest(), tolerances, further
         blocks, names = fault_records_into(data, output, *parts, **options)
     print_blocks(blocks)
     say(f"files in {output}: {', '.join(names)}")
