@@ -194,10 +194,13 @@ def _name_lines(ax, data: xr.Dataset, frequency: np.ndarray, size: np.ndarray, e
     """Name the largest lines in rows above them: the farther to the right, the lower, so that none crosses another."""
     floor, top = ends
     largest = [i for i in np.argsort(-size, kind="stable")[:LINES_NAMED].tolist() if size[i] > floor]
-    for row, line in enumerate(sorted(largest, key=lambda i: frequency[i])):
-        height = floor * (top / floor) ** (1.0 - _ROOM * (row + 0.5) / LINES_NAMED)
+    row = {line: number for number, line in enumerate(sorted(largest, key=lambda i: frequency[i]))}
+    # the largest first: a chart without room for all names keeps the first ones
+    for line in largest:
+        height = floor * (top / floor) ** (1.0 - _ROOM * (row[line] + 0.5) / LINES_NAMED)
         x = frequency[line]
-        ax.plot([x, x], [size[line], height], color=GREY, linewidth=0.7, label="_")
+        # pale dots, which nobody takes for a part of the line
+        ax.plot([x, x], [size[line], height], ":", color="0.65", linewidth=0.7, label="_")
         place = {"xytext": (3, 0), "textcoords": "offset points", "ha": "left", "va": "center"}
         ax.annotate(short_origin(data, line), (x, height), fontsize=SMALL, annotation_clip=False, **place)
 

@@ -182,13 +182,14 @@ def test_the_largest_lines_are_named_and_no_name_lies_on_another_or_on_a_leader(
     size = np.hypot(data["lines_real"].values, data["lines_imag"].values)[0]
     for sensor, ax in enumerate(figure.axes):
         largest = np.argsort(-size[sensor])[:LINES_NAMED]
-        assert {text.get_text() for text in ax.texts} == {short_origin(data, i) for i in largest}
+        assert [text.get_text() for text in ax.texts] == [short_origin(data, i) for i in largest], "the largest first"
         boxes = [text.get_window_extent() for text in ax.texts]
         numbers = range(len(boxes))
         assert not any(boxes[i].overlaps(boxes[k]) for i in numbers for k in numbers if k > i)
         leaders = [line for line in ax.lines if line.get_label().startswith("_")]
         paths = [line.get_transform().transform_path(line.get_path()) for line in leaders]
         assert len(paths) == LINES_NAMED
+        assert all(line.get_linestyle() == ":" for line in leaders), "none looks like a part of the spectrum"
         assert not any(path.intersects_bbox(box) for path in paths for box in boxes)
 
 
