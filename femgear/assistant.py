@@ -13,15 +13,18 @@ import sys
 import tomllib
 from collections.abc import Callable
 from functools import wraps
+from inspect import signature
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from pydantic import ValidationError
+
 from femgear.errors import CaseError, FemgearError, nvh_library
 from femgear.storage import files
+from femgear.trains.drafts import KINDS
 
 if TYPE_CHECKING:
     from mcp.server.mcpserver import MCPServer
-
 SKILL = Path(__file__).with_name("skill.md")
 """What `femgear skill` prints."""
 MOST_TEXT = 200_000
@@ -138,14 +141,49 @@ def make_server(folder: Path) -> MCPServer:
 
         return refusing
 
-    server = MCPServer("femgear", instructions=SKILL.read_text(encoding="utf-8"), log_level="WARNING")
-    for tool in _tools(folder):
+    tools = {tool.__name__: tool for tool in _tools(folder)}
+
+    class Server(MCPServer):
+        """Tells of arguments that do not fit a tool as commands tell of theirs."""
+
+        async def call_tool(self, name: str, arguments: dict[str, Any], context: Any = None) -> Any:
+            try:
+                return await super().call_tool(name, arguments, context)
+            except ToolError as error:
+                if isinstance(error.__cause__, ValidationError):
+                    raise ToolError(str(_other_arguments(tools[name], error.__cause__))) from error
+                raise
+
+    server = Server("femgear", instructions=SKILL.read_text(encoding="utf-8"), log_level="WARNING")
+    for tool in tools.values():
         server.tool()(with_refusals(tool))
     return server
 
 
+def _other_arguments(tool: Callable[..., Any], error: ValidationError) -> CaseError:
+    """Make the refusal of arguments of a tool, all of which are texts."""
+    wrong = [f"{part['loc'][0]} is {'missing' if part['type'] == 'missing' else 'no text'}" for part in error.errors()]
+    named = signature(tool).parameters.values()
+    texts = [entry.name if entry.default is entry.empty else f"{entry.name} (may be missing)" for entry in named]
+    return CaseError(
+        "the arguments do not fit the tool",
+        code="E-ARGUMENTS",
+        key=tool.__name__,
+        value=", ".join(wrong),
+        limit=f"texts: {', '.join(texts)}",
+    )
+
+
 def _tools(folder: Path) -> list[Callable[..., Any]]:
     """Tools of the server, whose docstrings tell an assistant what they are for."""
+
+    def text_of(name: str) -> str:
+        path = place_in(folder, name)
+        if path.suffix != ".toml" or not path.is_file():
+            raise CaseError(
+                "there is no such case file", code="E-FILE", key="name", value=name, limit="a name of list_files"
+            )
+        return path.read_text(encoding="utf-8")
 
     def list_files() -> list[str]:
         """List case files and folders of results."""
@@ -154,12 +192,7 @@ def _tools(folder: Path) -> list[Callable[..., Any]]:
 
     def read_case(name: str) -> str:
         """Read a case file, TOML text."""
-        path = place_in(folder, name)
-        if path.suffix != ".toml" or not path.is_file():
-            raise CaseError(
-                "there is no such case file", code="E-FILE", key="name", value=name, limit="a name of list_files"
-            )
-        return path.read_text(encoding="utf-8")[:MOST_TEXT]
+        return text_of(name)[:MOST_TEXT]
 
     def write_case(name: str, text: str) -> str:
         """Write or replace a case file, whose name ends in .toml; check it afterwards."""
@@ -171,18 +204,20 @@ def _tools(folder: Path) -> list[Callable[..., Any]]:
         return f"written: {name}"
 
     def new(kind: str, name: str) -> dict[str, Any]:
-        """Write a commented case of a kind: planetary, planar, helical, pair, gear_pair, gearbox; edit and check it."""
+        """Write a commented case of a kind; edit and check it."""
         place_in(folder, name)
         return command(folder, "new", _word(kind), "-o", name)
 
+    new.__doc__ = f"{new.__doc__} Kinds: {', '.join(KINDS)}."
+
     def check(name: str) -> dict[str, Any]:
         """Check a case: what it is, its warnings, and why a run would refuse it. Takes a second."""
-        check_text(place_in(folder, name).read_text(encoding="utf-8"))
+        check_text(text_of(name))
         return command(folder, "check", name, "--json")
 
     def run(name: str, results: str, only: str = "") -> dict[str, Any]:
         """Compute a case into a folder of results; only: one stage and what it needs. Seconds to minutes."""
-        check_text(place_in(folder, name).read_text(encoding="utf-8"))
+        check_text(text_of(name))
         place_in(folder, results)
         stage = ("--only", _word(only)) if only else ()
         return command(folder, "run", name, "-o", results, "--json", "--force", *stage)

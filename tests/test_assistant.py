@@ -10,6 +10,7 @@ import pytest
 from femgear.assistant import MOST_TEXT, SKILL, check_text, command, make_server, place_in
 from femgear.cli import main
 from femgear.errors import CaseError
+from femgear.trains.drafts import KINDS
 from femgear.trains.reading import read_case, with_values
 
 pytestmark = pytest.mark.usefixtures("pictures_undrawn")
@@ -79,6 +80,29 @@ def test_what_lies_outside_stays_closed(tmp_path):
     wanted = ["E-FILE"] * 6 + ["E-ARGUMENTS"] * 2
     assert all(f"[{code}]" in answer for code, (answer, _) in zip(wanted, answers, strict=True))
     assert sorted(path.name for path in tmp_path.rglob("*")) == ["inside", "link.toml", "secret.toml"]
+
+
+def test_refused_calls_say_what_is_needed_and_leave_nothing(tmp_path):
+    _, answers = asked(
+        make_server(tmp_path),
+        ("run", {}),
+        ("check", {"name": 3}),
+        ("run", {"name": "absent.toml", "results": "out"}),
+        ("compare", {"first": "a", "second": "b", "output": "compared"}),
+    )
+    assert "[E-ARGUMENTS] run: " in answers[0][0] and "name is missing, results is missing" in answers[0][0]
+    assert "texts: name, results, only (may be missing)" in answers[0][0] and "pydantic" not in answers[0][0]
+    assert "name is no text" in answers[1][0] and "[E-FILE] name: " in answers[2][0]
+    assert [error for _, error in answers] == [True, True, True, False]
+    assert json.loads(answers[3][0])["exit_code"] == 4 and not [*tmp_path.iterdir()]
+
+
+def test_the_kinds_of_new_are_those_of_the_command(tmp_path):
+    tools = asyncio.run(make_server(tmp_path).list_tools())
+    (told,) = (tool.description for tool in tools if tool.name == "new")
+    assert told.endswith(f"Kinds: {', '.join(KINDS)}.")
+    text = SKILL.read_text(encoding="utf-8")
+    assert all(f"`{kind}`" in text for kind in KINDS)
 
 
 def test_case_files_may_not_name_files_outside():

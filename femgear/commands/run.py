@@ -268,9 +268,9 @@ def compare(*runs: Path, output: Annotated[Path, Parameter(name=("--output", "-o
     if len(runs) < 2:
         count = f"{len(runs)} runs"
         raise CaseError("there is nothing to compare", code="E-ARGUMENTS", value=count, limit="two or more")
-    own_files(output, ["compare.html"])
     opened = [open_results(folder) for folder in runs]
     train = same_train(opened)
+    own_files(output, ["compare.html"])
     print_blocks(compared(train, *opened))
     write_text(compare_page(train, *opened), output / "compare.html")
     say(f"page: {output / 'compare.html'}")
