@@ -111,7 +111,7 @@ def _held(case: GearboxCase, problems: Sequence[CaseError]) -> Iterator[CaseErro
             yield from thrusts
         if number == 0 and not any(key.startswith("shaft") for key in keys):
             unclosed = [*unclosed_chains(case, flow)]
-            yield from unclosed or misplaced_branches(case)
+            yield from [*misplaced_branches(case)] or unclosed
 
 
 def _misplaced(problem: CaseError) -> bool:

@@ -3,6 +3,7 @@
 import json
 import math
 import re
+import tomllib
 
 import pytest
 from planet_gearboxes import stepped_set
@@ -47,6 +48,27 @@ def test_equal_stepped_planets_at_thirds_are_refused_with_places_that_fit():
     assert read_case(tables)
     apart = [math.atan2(*(float(x.split()[0]) for x in shaft["axis"][::-1])) for shaft in tables["shaft"][4:]]
     assert [angle % (2 * math.pi) * 3712 / (2 * math.pi) for angle in apart] == pytest.approx([1237, 2475], abs=1e-4)
+
+
+@pytest.mark.parametrize(("kind", "step"), [("double", 60), ("ravigneaux", 6), ("wolfrom", 45)])
+def test_a_branch_of_any_kind_that_is_turned_has_its_place_back_by_the_remedy(kind, step):
+    tables = tomllib.loads(new_case(kind))
+    shafts = {shaft["name"]: shaft for shaft in tables["shaft"]}
+    turn = complex(math.cos(math.radians(1.0)), math.sin(math.radians(1.0)))
+    stood = {name: complex(*_mm(shaft["axis"])) for name, shaft in shafts.items() if name.endswith("planet 2")}
+    for name, place in stood.items():
+        shafts[name]["axis"] = [f"{(place * turn).real!r} mm", f"{(place * turn).imag!r} mm"]
+    with pytest.raises(CaseError, match="do not assemble") as refusal:
+        read_case(tables)
+    (problem,) = refusal.value.problems
+    assert problem.code == "E-ASSEMBLY" and f"1/{step} of a turn" in problem.limit
+    for name, place in stood.items():
+        axis = json.loads(re.search(rf"{name}: axis = (\[.*?\])", problem.remedies[0]).group(1))
+        assert complex(*_mm(axis)) == pytest.approx(place, abs=1e-5)
+
+
+def _mm(axis):
+    return [float(text.split()[0]) for text in axis]
 
 
 def test_planets_whose_gears_are_timed_fit_anywhere():
