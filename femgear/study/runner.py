@@ -300,7 +300,9 @@ class Dask(Runner):
         self._done: queue.Queue = queue.Queue()
         try:
             from distributed import Client, Security
+            from distributed.comm.addressing import get_address_host_port
 
+            get_address_host_port(address, strict=True)  # a client of no address would wait for 40 s at its end
             if address.startswith("tls") and not Security().get_connection_args("client").get("ssl_context"):
                 raise ValueError("no certificates are configured")  # it would wait for 40 s at its end
             # what it has to say of a lost connection is said by E-CLUSTER

@@ -176,6 +176,9 @@ def test_refusals(capsys):
     assert type(open_runner(1)) is Runner and open_runner(3).workers == 3
     words = ["sweep", str(CASE), "-o", "out", "--over", "carrier.mass=1 kg,2 kg", "--cluster", "udp:nowhere"]
     assert cli.main(words) == 5 and "E-CLUSTER" in capsys.readouterr().err
+    start = time.perf_counter()
+    assert cli.main([*words[:-1], "somewhere"]) == 5 and "E-CLUSTER" in capsys.readouterr().err
+    assert time.perf_counter() - start < 20.0  # no client is opened, whose end would wait for 40 s
 
 
 def test_keys_without_an_outcome_are_an_error(case, tmp_path):
