@@ -27,7 +27,9 @@ _STEP_ERROR = 12.0**-0.5
 """Standard error of an edge that lies anywhere within a sample, in samples."""
 _NEIGHBOURS = 9
 _LONG, _SHORT = 1.5, 0.6
-"""Interval of pulses over the median of its neighbours that is a lost pulse, or one too many."""
+"""Interval of pulses over the median of its neighbours, or the one before, that is a lost pulse, or one too many."""
+_AWAY, _OUTLYING = 0.05, 20.0
+"""Distance of a pulse from the curve of its neighbours, over the median interval and that distance of most pulses."""
 _FINEST = 4.0
 """Samples between pulses, at least."""
 _HIGHEST = 1.0 / 3.0
@@ -102,7 +104,8 @@ class AngleSignal:
 def turns_of_pulses(channel: Channel, per_turn: int = 1) -> Turns:
     """Find the turns of a shaft from its pulses: their rising edges, at the level above the middle.
 
-    CaseError: E-FILE: fewer than three pulses, a lost one, one too many, too few samples between them.
+    CaseError: E-FILE: fewer than three pulses, a lost one, one too many, a late or an early one, too few samples
+    between them.
 
     Parameters
     ----------
@@ -111,8 +114,6 @@ def turns_of_pulses(channel: Channel, per_turn: int = 1) -> Turns:
     per_turn : int
         Pulses in a turn of the shaft.
     """
-    from scipy.ndimage import median_filter
-
     values, levels = channel.values, (channel.values.min(), channel.values.max())
     middle, margin = 0.5 * (levels[0] + levels[1]), _HYSTERESIS * (levels[1] - levels[0])
     side = np.where(values > middle + margin, 1, np.where(values < middle - margin, -1, 0))
@@ -125,12 +126,31 @@ def turns_of_pulses(channel: Channel, per_turn: int = 1) -> Turns:
         remedy = "name the channel of the tachometer by --pulses, or record more turns"
         raise channel.problem(f"{len(time)} pulses", limit="3 or more", remedy=remedy)
     interval = np.diff(time)
-    ratio = interval / median_filter(interval, min(_NEIGHBOURS, len(interval)), mode="nearest")
     if np.median(interval) * channel.rate < _FINEST:
         limit, remedy = f"{_FINEST:g} or more", "take pulses of a slower shaft, or sample them faster"
         value = f"{np.median(interval) * channel.rate:.3g}"
         raise channel.problem("too few samples between pulses", value=value, limit=limit, remedy=remedy)
+    _refuse_wrong_pulses(channel, time)
+    steps = (before < levels[0] + margin) & (after > levels[1] - margin)
+    time, error, wave = _unquantised(time, channel.rate, steps=bool(np.median(steps)))
+    return Turns(time, np.arange(len(time)) / per_turn, error, wave)
+
+
+def _refuse_wrong_pulses(channel: Channel, time: np.ndarray) -> None:
+    """Refuse (CaseError, E-FILE) times [s] of pulses some of which are lost, too many, or off those beside them.
+
+    An interval is compared with the median of its neighbours and, as every other pulse may be lost from some time on,
+    with the one before. A pulse is compared with the cubic through two on either side.
+    """
+    from scipy.ndimage import median_filter
+
+    interval = np.diff(time)
+    # at the ends by the neighbours alone: repeated there, a wrong interval would be its own median
+    ratio = interval / median_filter(interval, min(_NEIGHBOURS, len(interval)), mode="mirror")
     wrong = np.flatnonzero((ratio > _LONG) | (ratio < _SHORT))
+    if not len(wrong):
+        ratio = np.append(1.0, interval[1:] / interval[:-1])
+        wrong = np.flatnonzero((ratio > _LONG) | (ratio < _SHORT))
     if len(wrong):
         lost = ratio[wrong[0]] > _LONG
         raise channel.problem(
@@ -140,9 +160,18 @@ def turns_of_pulses(channel: Channel, per_turn: int = 1) -> Turns:
             limit=f"{_SHORT:g} to {_LONG:g} times",
             remedy="cut the record there, or mend the channel; the angle is not guessed",
         )
-    steps = (before < levels[0] + margin) & (after > levels[1] - margin)
-    time, error, wave = _unquantised(time, channel.rate, steps=bool(np.median(steps)))
-    return Turns(time, np.arange(len(time)) / per_turn, error, wave)
+    if len(time) < _FEWEST_SMOOTHED:
+        return
+    away = time[2:-2] - (4.0 * (time[1:-3] + time[3:-1]) - time[:-4] - time[4:]) / 6.0
+    most = int(np.abs(away).argmax())
+    share = away[most] / float(np.median(interval))
+    if abs(share) > _AWAY and abs(away[most]) > _OUTLYING * np.median(np.abs(away)):
+        raise channel.problem(
+            f"a pulse is {'late' if share > 0 else 'early'} at {time[most + 2]:.6g} s",
+            value=f"{abs(share):.2g} of an interval off the curve of the pulses beside it",
+            limit=f"{_AWAY:g}, or {_OUTLYING:g} times what most pulses are",
+            remedy="cut the record there, or mend the channel; the angle is not guessed",
+        )
 
 
 def _unquantised(time: np.ndarray, rate: float, *, steps: bool) -> tuple[np.ndarray, float, float]:

@@ -53,6 +53,38 @@ def few(values, rising):
     values[rising[1] + 90 :] = 0.0
 
 
+def second_missing(values, rising):
+    values[rising[1] - 2 : rising[2] - 2] = values[rising[1] - 2]
+
+
+def last_missing(values, rising):
+    values[rising[-2] - 2 : rising[-1] - 2] = values[rising[-2] - 2]
+
+
+def every_other_missing(values, rising):
+    for k in range(1, 30, 2):
+        values[rising[k] - 2 : rising[k + 1] - 2] = values[rising[k] - 2]
+
+
+def late(values, rising):
+    at = rising[40] + (rising[41] - rising[40]) // 10
+    values[rising[40] - 2 : rising[41] - 2] = values[rising[40] - 2]
+    values[at : at + 20] = values.max()
+
+
+@pytest.mark.parametrize("change", [second_missing, last_missing, every_other_missing, late])
+def test_wrong_pulses_at_the_ends_and_regular_ones_are_refused(change):
+    values, rising = edges(PULSES)
+    change(values, rising)
+    with pytest.raises(CaseError, match="a pulse is late at" if change is late else "a pulse|pulse too many") as refused:
+        turns_of_pulses(channel(values))
+    assert refused.value.code == "E-FILE"
+    if change is late:
+        stated = float(str(refused.value).partition("late at ")[2].split()[0])
+        interval = (rising[41] - rising[40]) / RATE
+        assert stated == pytest.approx(rising[40] / RATE + 0.1 * interval, abs=0.01 * interval)
+
+
 @pytest.mark.parametrize(
     ("change", "words"), [(missing, "a pulse is missing at"), (doubled, "a pulse too many at"), (few, "2 pulses")]
 )
