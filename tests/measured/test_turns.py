@@ -76,7 +76,9 @@ def late(values, rising):
 def test_wrong_pulses_at_the_ends_and_regular_ones_are_refused(change):
     values, rising = edges(PULSES)
     change(values, rising)
-    with pytest.raises(CaseError, match="a pulse is late at" if change is late else "a pulse|pulse too many") as refused:
+    with pytest.raises(
+        CaseError, match="a pulse is late at" if change is late else "a pulse|pulse too many"
+    ) as refused:
         turns_of_pulses(channel(values))
     assert refused.value.code == "E-FILE"
     if change is late:
