@@ -94,9 +94,11 @@ def _against(case: GearboxCase) -> Iterator[tuple[str, str, str]]:
     """Say what keeps a gearbox from having a linear model: key, reason, remedy."""
     if not (case.pair or case.planetary):
         yield "pair", "it has no meshes", "export a gearbox with stages"
-    turning = [stage.name for stage in case.pair if stage.carrier is not None]
-    if case.motions != "rotation":
-        turning += [stage.name for stage in case.planetary if stage.carrier != CASING]
+    of_shafts = [stage.name for stage in case.pair if stage.carrier is not None]
+    if of_shafts:
+        reason = f"the planets of {', '.join(of_shafts)} are shafts on a carrier, which no such model has"
+        yield "pair.carrier", reason, "take lines and histories of femgear run, with [transient] over the time"
+    turning = [stage.name for stage in case.planetary if stage.carrier != CASING and case.motions != "rotation"]
     if turning:
         reason = f"the planets of {', '.join(turning)} run around, and with them the directions of their meshes"
         yield "planetary", reason, 'motions = "rotation" gives the model of rotations alone, or hold the carrier'

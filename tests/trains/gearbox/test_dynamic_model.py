@@ -8,6 +8,7 @@ from itertools import product
 import numpy as np
 import pytest
 from casings import pair_in_a_casing
+from planet_gearboxes import stepped_set
 from small_gearbox import loose_pair_tables, pair_tables, planetary_tables
 
 from femgear.errors import CaseError
@@ -144,3 +145,9 @@ def test_tables_have_the_period_of_every_mesh():
     tables = mesh_tables(model, HARMONICS)
     assert tables.stiffness.shape[0] == 2
     assert tables.stiffness.mean(axis=1) == pytest.approx([4e8, 5e8])
+
+
+def test_planets_that_are_shafts_are_refused_with_what_else_there_is():
+    with pytest.raises(CaseError, match="are shafts on a carrier") as refused:
+        dynamic_model(read_case(stepped_set(motions="rotation")))
+    assert "pair.carrier" in str(refused.value) and "transient" in str(refused.value)
