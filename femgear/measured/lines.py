@@ -70,7 +70,8 @@ def sharpened_lines(spectrum: OrderSpectrum, threshold: float) -> tuple[np.ndarr
     amplitude, step = spectrum.amplitude, 1.0 / spectrum.turns
     around = max(_AROUND, round(_ORDERS_AROUND / step)) | 1
     bins = find_lines(spectrum.order, amplitude, threshold=threshold)
-    noise = median_filter(amplitude, min(around, len(amplitude)), mode="nearest")
+    # mirrored at the ends: a low end that is repeated would be its own median
+    noise = median_filter(amplitude, min(around, len(amplitude)), mode="mirror")
     bins = bins[(bins < len(amplitude) - 1) & (amplitude[bins] > _ABOVE_NOISE * noise[bins])]
     left, right = amplitude[bins - 1], amplitude[bins + 1]
     ratio = np.maximum(left, right) / amplitude[bins]
