@@ -66,7 +66,8 @@ def test_life_is_that_of_the_equivalent_load(case):
 
 def test_a_set_has_lives_of_its_planets_alone_without_a_treatment(case):
     loads = [{"torque": f"{torque} N m", "speed": "543 rpm", "share": 0.5} for torque in (60, -120)]
-    loaded = with_values(case, {"operation.load_case": loads, "operation.required_hours": 1e5})
+    untreated = dict.fromkeys(("material.treatment", "material.hardness", "ring.material"))
+    loaded = with_values(case, {"operation.load_case": loads, "operation.required_hours": 1e5} | untreated)
     assert not LIFE.unavailable(loaded) and LIFE.unavailable(with_values(loaded, {"planet.dynamic_rating": None}))
     result = solve_life(loaded, solve_static(loaded))
     data = result.contents()

@@ -9,6 +9,7 @@ import pytest
 
 from femgear.errors import CaseError, ConvergenceError
 from femgear.solvers.continuation.branches import frequency_response_curve, parameter_curve
+from femgear.solvers.linear.modal import undamped_modes
 from femgear.solvers.linear.receptance import reduce_problem
 from femgear.solvers.periodic import harmonic_balance
 from femgear.solvers.periodic.equations import HarmonicBalance
@@ -293,12 +294,14 @@ def test_refusals_name_what_is_missing():
     assert "bearing 1" in caught.value.message and "mesh" not in caught.value.message
 
 
-@pytest.mark.parametrize("soft", [0.0, 1e-9])
-def test_a_spring_of_next_to_no_stiffness_is_named_as_one_of_none(soft):
+def test_a_spring_of_no_stiffness_is_named_and_a_soft_one_has_its_mode():
     bodies = MechanicalSystem(np.eye(2), np.eye(2), np.zeros((2, 2)), np.eye(2), np.zeros(2), ("x", "y"))
-    springs = tuple(PolynomialSprings([i], [[k, 0.0, 1.0]]) for i, k in enumerate((1e6, soft)))
+    stiff, none, soft = (PolynomialSprings([i], [[k, 0.0, 1.0]]) for i, k in ((0, 1e6), (1, 0.0), (1, 1e-9)))
     with pytest.raises(ConvergenceError, match="spring 2 has no linear stiffness"):
-        solve_harmonic_balance(NonlinearSystem(bodies, springs), 1.0, harmonics=3)
+        solve_harmonic_balance(NonlinearSystem(bodies, (stiff, none)), 1.0, harmonics=3)
+    assert solve_harmonic_balance(NonlinearSystem(bodies, (stiff, soft)), 1.0, harmonics=3).converged
+    modes = undamped_modes(bodies, np.array([1e6, 1e-9]))
+    assert 2.0 * np.pi * modes.frequency == pytest.approx([1e-9**0.5, 1e3], rel=1e-12)
 
 
 def test_cubic_spring_alone_is_solved_with_the_reference_that_the_refusal_names():

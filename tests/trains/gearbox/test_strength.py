@@ -113,7 +113,8 @@ def test_stages_are_rated_with_their_own_sharing_and_face_load(planetary):
 
 
 def test_nothing_is_stored_where_nothing_asks(planetary):
-    plain = with_values(planetary, dict.fromkeys(LIMITS))
+    treated = ("material.treatment", "material.hardness", "ring.material")
+    plain = with_values(planetary, dict.fromkeys((*LIMITS, *treated)))
     assert rated_stage(box(), "set", contact_of(plain, 50.0, [1000.0] * 6), 500.0) is None
     assert strength_contents([state_of(box(), {"set": contact_of(plain, 50.0, [1.0] * 6)})]) == ({}, {}, {})
     assert describe_strength(xr.Dataset(), 0, "") == () and not list(smallest_safeties(xr.Dataset(), None, Marks(())))

@@ -198,7 +198,7 @@ def test_stiffest_supports_that_are_allowed_pass_the_check(given):
     check_helical_case(stiff, planetary_set(stiff))
     # past the bounds of the file the reason is that of the stiffness, not of a mesh
     helical = stiff.helical
-    bodies = {body: getattr(helical, body).model_copy(update={"tilt_stiffness": 1e16}) for body in BODIES}
+    bodies = {body: getattr(helical, body).model_copy(update={"tilt_stiffness": 1e26}) for body in BODIES}
     beyond = stiff.model_copy(update={"helical": helical.model_copy(update=bodies)})
     with pytest.raises(CaseError, match="E-RANGE") as info:
         check_helical_case(beyond, planetary_set(beyond))
