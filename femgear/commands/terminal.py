@@ -161,6 +161,7 @@ def _broken(name: str, width: int) -> str:
 
 
 def say(text: str) -> None:
+    """Print a line on standard output, in characters that it can show."""
     print(printable(text))
 
 

@@ -195,13 +195,8 @@ def _description(model: DynamicModel, variables: list[UnitVariable], guid: str) 
     _add_units_and_times(root, model)
     listed = ElementTree.SubElement(root, "ModelVariables")
     for number, variable in enumerate(variables):
-        entry = {"name": variable.name, "valueReference": str(number), "causality": variable.causality}
-        entry |= {"description": variable.description}
-        if variable.causality == "parameter":
-            entry |= {"variability": "fixed", "initial": "exact"}
-        real = {"unit": variable.unit} if variable.unit in _UNITS else {}
-        real |= {} if variable.start is None else {"start": repr(float(variable.start))}
-        ElementTree.SubElement(ElementTree.SubElement(listed, "ScalarVariable", entry), "Real", real)
+        part = ElementTree.SubElement(listed, "ScalarVariable", _entries(number, variable))
+        ElementTree.SubElement(part, "Real", _numbers(variable))
     structure = ElementTree.SubElement(root, "ModelStructure")
     seen = [str(number) for number, variable in enumerate(variables, 1) if variable.causality == "output"]
     for kind in ("Outputs", "InitialUnknowns"):
@@ -210,6 +205,19 @@ def _description(model: DynamicModel, variables: list[UnitVariable], guid: str) 
             ElementTree.SubElement(part, "Unknown", {"index": number})
     ElementTree.indent(root)
     return ElementTree.tostring(root, encoding="utf-8", xml_declaration=True)
+
+
+def _entries(number: int, variable: UnitVariable) -> dict[str, str]:
+    """Entries of a variable that both versions give it."""
+    entries = {"name": variable.name, "valueReference": str(number), "causality": variable.causality}
+    entries |= {"description": variable.description}
+    return entries | ({"variability": "fixed", "initial": "exact"} if variable.causality == "parameter" else {})
+
+
+def _numbers(variable: UnitVariable) -> dict[str, str]:
+    """Entries of the number that a variable is: its unit, and with what it starts."""
+    unit = {"unit": variable.unit} if variable.unit in _UNITS else {}
+    return unit | ({} if variable.start is None else {"start": repr(float(variable.start))})
 
 
 def _add_units_and_times(root: ElementTree.Element, model: DynamicModel) -> None:
@@ -232,13 +240,7 @@ def _description_3(model: DynamicModel, variables: list[UnitVariable], token: st
     _add_units_and_times(root, model)
     listed = ElementTree.SubElement(root, "ModelVariables")
     for number, variable in enumerate(variables):
-        entry = {"name": variable.name, "valueReference": str(number), "causality": variable.causality}
-        entry |= {"description": variable.description}
-        if variable.causality == "parameter":
-            entry |= {"variability": "fixed", "initial": "exact"}
-        entry |= {"unit": variable.unit} if variable.unit in _UNITS else {}
-        entry |= {} if variable.start is None else {"start": repr(float(variable.start))}
-        ElementTree.SubElement(listed, "Float64", entry)
+        ElementTree.SubElement(listed, "Float64", _entries(number, variable) | _numbers(variable))
     time = {"name": "time", "valueReference": str(len(variables)), "causality": "independent"}
     ElementTree.SubElement(listed, "Float64", time | {"variability": "continuous", "description": "time [s]"})
     structure = ElementTree.SubElement(root, "ModelStructure")

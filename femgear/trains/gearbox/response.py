@@ -417,7 +417,7 @@ class _PartLines:
 
     Parameters
     ----------
-    found : Deflection
+    state : Deflection
         Loaded state.
     part : _ExcitingPart
         What excites.
@@ -440,7 +440,7 @@ class _PartLines:
         longest: RunningResponse,
         paths: CasingPaths | None,
     ):
-        self.found, self.part, self.outputs, self.casing_paths = state, part, outputs, paths
+        self.state, self.part, self.outputs, self.casing_paths = state, part, outputs, paths
         running, sensors = part.structured.running, gearbox_sensors(state.model.case)
         self.on_own_ring = [number for number, sensor in enumerate(sensors) if sensor.ring == part.name]
         on_ring = [sensors[i] for i in self.on_own_ring]
@@ -465,7 +465,7 @@ class _PartLines:
 
     def keep(self, i: int, response: RunningResponse) -> None:
         """Keep the lines at a speed."""
-        part, model, running = self.part, self.found.model, self.part.structured.running
+        part, model, running = self.part, self.state.model, self.part.structured.running
         few = self.line < len(response.modal)
         there = self.line[few], self.at[few]
         amplitude = response.lines(self.outputs.T)[there]
@@ -474,7 +474,7 @@ class _PartLines:
         self.approach[i] = np.sqrt(0.5 * (np.abs(amplitude[:, self.measured :]) ** 2).sum(axis=0))
         if self.casing_paths is not None and self.by_path is not None:
             paths, motion = self.casing_paths, part.structured.motion
-            forces = forces_on_casing(paths, self.found, part.name, part.structured, response)
+            forces = forces_on_casing(paths, self.state, part.name, part.structured, response)
             forces = np.moveaxis(response.one_sided(forces)[there], 0, -1)
             moved = response.lines(motion[paths.places].T)[there].T
             self.by_path[i][..., few] = paths.heard(forces, moved, response.frequency[there])
