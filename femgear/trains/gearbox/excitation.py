@@ -30,17 +30,15 @@ _RECORD = 2**13
 
 
 def exciting_stages(state: Deflection) -> list[StageModel]:
-    """List the stages that excite a gearbox: by their contact, or by the contact ratios of meshes that carry.
-
-    Teeth of stages that turn as a block do not pass, and excite nothing.
-    """
+    """List the stages that excite a gearbox: those whose stiffness varies and whose teeth pass one another."""
     model = state.model
-    return [
-        stage
-        for stage in model.stages
-        if model.flow.passes(stage.section)
-        and (stage.name in state.contacts or (stage.section.counts_pairs and model.flow.carries(stage.section)))
-    ]
+    return [stage for stage in model.stages if varies(state, stage) and model.flow.passes(stage.section)]
+
+
+def varies(state: Deflection, stage: StageModel) -> bool:
+    """Whether the meshes of a stage vary with their position: by contact, or by contact ratios where they carry."""
+    by_pairs = stage.section.counts_pairs and state.model.flow.carries(stage.section)
+    return stage.name in state.contacts or by_pairs
 
 
 def excitation_of(
@@ -76,9 +74,9 @@ def excitation_of(
 
 
 def constant_excitation(state: Deflection, stage: StageModel, *, steps: Steps | None = None) -> MeshExcitation:
-    """Make meshes that excite nothing: of the means of a stage that excites, else of a constant stiffness."""
+    """Make meshes that excite nothing: of the means of a stage that varies, else of a constant stiffness."""
     count = 512
-    if stage in exciting_stages(state):
+    if varies(state, stage):
         drive = excitation_of(state, stage, steps=steps)
         means = {
             name: np.repeat(getattr(drive, name).mean(axis=1, keepdims=True), count, axis=1)

@@ -23,7 +23,7 @@ from femgear.system.force_laws import GearMeshes
 from femgear.system.system import MeshExcitation
 from femgear.system.turning_meshes import TurningMeshes
 from femgear.trains.gearbox.deflection import Deflection, solve_deflection
-from femgear.trains.gearbox.excitation import constant_excitation, excitation_of, exciting_stages
+from femgear.trains.gearbox.excitation import constant_excitation, excitation_of, varies
 from femgear.trains.gearbox.model import reference_shaft
 from femgear.trains.gearbox.nonlinear import NonlinearGearbox, NonlinearStage, nonlinear_gearbox
 from femgear.trains.gearbox.transient_case import TorqueOverTimeSection, TransientSection, torque_histories
@@ -135,10 +135,9 @@ def gearbox_in_time(
 
 def all_excitations(state: Deflection, *, steps: Steps | None = None) -> Mapping[str, MeshExcitation]:
     """Compute what the meshes of all stages excite with; those of a constant stiffness are springs of it."""
-    exciting = [stage.name for stage in exciting_stages(state)]
     return {
         stage.name: excitation_of(state, stage, steps=steps)
-        if stage.name in exciting or stage.section.counts_pairs
+        if varies(state, stage) or stage.section.counts_pairs
         else constant_excitation(state, stage, steps=steps)
         for stage in state.model.stages
     }

@@ -12,8 +12,16 @@ from femgear.gears.gear import Gear
 from femgear.gears.planetary import close_set
 from femgear.system.fourier import harmonics_of
 from femgear.trains.gearbox.deflection import Deflection, solve_deflection
-from femgear.trains.gearbox.excitation import excitation_of, exciting_stages, mesh_phases, pair_count_wave
+from femgear.trains.gearbox.excitation import (
+    constant_excitation,
+    excitation_of,
+    exciting_stages,
+    mesh_phases,
+    pair_count_wave,
+    varies,
+)
 from femgear.trains.gearbox.response import solve_gearbox_response
+from femgear.trains.gearbox.transient import all_excitations
 from femgear.trains.reading import read_case
 
 
@@ -124,3 +132,14 @@ def test_whole_contact_or_overlap_ratios_keep_the_stiffness_constant():
 def test_a_path_has_a_length():
     with pytest.raises(CaseError, match="ends before"):
         pair_count_wave(0.5, 0.5, 3)
+
+
+def test_meshes_of_gears_that_stand_excite_nothing_and_vary_where_these_are_brought_to_turn():
+    tables = pair_tables()
+    tables["pair"][0]["mesh"] |= {"contact_ratio": 1.6}
+    tables["operation"]["load_case"][0]["speed"]["input"] = "0 rpm"
+    state = solve_deflection(read_case(tables))
+    assert not exciting_stages(state)
+    (stage,) = state.model.stages
+    assert varies(state, stage) and np.ptp(all_excitations(state)[stage.name].stiffness) > 0.0
+    assert np.ptp(constant_excitation(state, stage).stiffness) == 0.0
