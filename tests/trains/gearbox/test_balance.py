@@ -241,7 +241,7 @@ def test_planets_that_are_shafts_part_as_those_of_a_planetary_stage(torque):
     """All meshes of one frequency excite at once, and go round with the carrier."""
     ((shafts,), (stage,)) = (solve_balance(parting_set(make, torque=torque)) for make in (simple_set, known_set))
     assert shafts.name == "sun-0..2, 0..2-ring" and shafts.solution.converged and stage.solution.converged
-    # waves that pass the planets the other way amplify less: with the other torque all teeth carry
+    # with the other torque all teeth carry
     assert (stage.drive.min() == 0.0) == (torque > 0.0)
     np.testing.assert_allclose(shafts.drive, stage.drive, rtol=0.0, atol=1e-9 * stage.drive.max())
     apart = np.abs(shafts.acceleration - stage.acceleration).max()
