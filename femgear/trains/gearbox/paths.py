@@ -22,8 +22,8 @@ from femgear.trains.gearbox.modes import linear_system
 from femgear.trains.gearbox.sensors import sensor_rows
 from femgear.trains.gearbox.stage_structure import StructuredStage, row_waves
 
-RIGID = "rigid seats"
-"""Path of what is rigid: the rest of the force on the casing."""
+RIGID = "rigidly held parts"
+"""Path of what the casing holds without springs, such as a ring that stands: the rest of the force on it."""
 
 
 @dataclass(frozen=True)
