@@ -10,6 +10,7 @@ import os
 import sys
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from typing import TypeVar
 
 import numpy as np
 
@@ -199,6 +200,9 @@ class FemgearError(Exception):
         return "\n".join([*map(printable, lines), *map(str, several)])
 
 
+_Refusal = TypeVar("_Refusal", bound=FemgearError)
+
+
 def refused_at(problem: FemgearError, key: str) -> CaseError:
     """Copy a refusal as that of another entry of a case."""
     return CaseError(
@@ -246,8 +250,8 @@ class CaseError(FemgearError, ValueError):
     default_code = "E-CASE"
 
 
-def several(problems: Sequence[CaseError], count: int = 0) -> CaseError:
-    """Make one error that lists all problems (at least one) and has them in its ``problems``.
+def several(problems: Sequence[_Refusal], count: int = 0) -> _Refusal:
+    """Make one error that lists all problems (at least one, of one class) and has them in its ``problems``.
 
     ``count`` is how many there are where some were left out.
     """
@@ -256,8 +260,8 @@ def several(problems: Sequence[CaseError], count: int = 0) -> CaseError:
     else:
         count = max(count, len(problems))
         first = f", the first {MOST_SHOWN} of them" if count > MOST_SHOWN else ""
-        combined = CaseError(f"{count} problems{first}")
-        combined.code = problems[0].code if len({problem.code for problem in problems}) == 1 else "E-CASE"
+        combined = type(problems[0])(f"{count} problems{first}")
+        combined.code = problems[0].code if len({problem.code for problem in problems}) == 1 else combined.default_code
     combined.problems = tuple(problems)
     return combined
 

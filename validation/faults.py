@@ -1,4 +1,4 @@
-"""Rows of the validation of faulty teeth: cracks by energy and one grid, none at all, characteristic frequencies."""
+"""Rows of faulty teeth: cracks by energy and one grid, none at all, faults together, characteristic frequencies."""
 
 from __future__ import annotations
 
@@ -19,6 +19,7 @@ from femgear.contact.cracked_flanks import (
     cracked_grids,
     flanks_of_grids,
 )
+from femgear.contact.cycle import walk_mesh_cycle
 from femgear.contact.windows import first_windows, mesh_windows
 from femgear.fe.compliance import boundary_nodes, node_dofs, symmetric_factor
 from femgear.fe.cracks import SplitGrid, WholeSchur, condense_whole, cracked_ring, split_grid
@@ -26,7 +27,7 @@ from femgear.fe.elasticity import Material
 from femgear.fe.grid import Grid, copy_nodes, shape_functions
 from femgear.gears.cracked_tooth import BESIDE, SECTION
 from femgear.gears.deviations import no_deviations
-from femgear.gears.faults import LEFT, Crack
+from femgear.gears.faults import LEFT, Crack, Spall, Wear
 from femgear.gears.gear import Gear
 from femgear.gears.kinematics import speeds
 from femgear.gears.planetary import close_set, equal_planet_angles
@@ -262,6 +263,44 @@ def j_integral(split: SplitGrid, field: np.ndarray, radius: float) -> float:
     inside = np.einsum("epij,epi,epj->ep", stress, grad_u[..., 0], grad_q) - density * grad_q[..., 0]
     area = np.linalg.det(jacobian) * _WEIGHTS
     return float((inside * area).sum())
+
+
+def over_one_another() -> tuple[Row, ...]:
+    """Contact of a tooth with two pits over one another in worn flanks, beside the same gaps in entries by hand."""
+    gears = reference_set()
+    bodies = make_bodies(make_sectors(gears, STEEL, flank_elements=6), STEEL)
+    shallow = Spall(0, 0, 3, LEFT, low=8.2e-3, high=8.8e-3, depth=2e-6)
+    deep = replace(shallow, low=8.5e-3, high=9.2e-3, depth=5e-6)
+    even = Wear(0, 0, None, LEFT, roll=(0.0, 1.0), depth=(4e-6, 4e-6))
+    rising = Wear(0, 0, 3, LEFT, roll=(8e-3, 9e-3), depth=(0.0, 3e-6))
+    by_hand = (
+        replace(shallow, high=float(np.nextafter(deep.low, 0.0))),
+        deep,
+        *(replace(even, tooth=tooth) for tooth in range(gears.sun.teeth) if tooth != 3),
+        replace(rising, depth=(4e-6, 7e-6)),
+    )
+    together, written = (
+        walk_mesh_cycle(
+            gears,
+            bodies,
+            sun_torque=100.0,
+            positions=4,
+            deviations=replace(no_deviations(gears), faults=faults),
+            periods=gears.sun.teeth,
+        )
+        for faults in ((shallow, deep, even, rising), by_hand)
+    )
+    source = "pits side by side and wear in one entry, the gaps added by hand"
+    return tuple(
+        at_most(
+            "faults together",
+            source,
+            f"two pits over one another in wear of two entries: {words}, largest difference over the largest",
+            1e-9,
+            np.abs(getattr(together, name) - getattr(written, name)).max() / np.abs(getattr(written, name)).max(),
+        )
+        for words, name in (("arc of the sun", "sun_arc"), ("loads of tooth pairs", "tooth_load"))
+    )
 
 
 def frequencies() -> tuple[Row, ...]:

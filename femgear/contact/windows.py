@@ -30,7 +30,7 @@ from femgear.contact.flank_pairs import (
 from femgear.contact.local_compliance import hertz_half_width, surface_displacement
 from femgear.errors import LESS_TORQUE, ContactError
 from femgear.gears.deviations import SetDeviations
-from femgear.gears.faults import Crack, MissingTooth, missing_length
+from femgear.gears.faults import Crack, MissingTooth, Spall, missing_length
 from femgear.gears.pair import GearSet
 
 WINDOW_NODES = np.array([0.0, 0.5, 1.0])
@@ -230,11 +230,7 @@ def mesh_windows(  # noqa: PLR0913
     whole = deviations
     if deviations is not None and deviations.faults:
         # nor does a tooth that is missing say where others come nearest
-        faults = [
-            fault
-            for fault in deviations.faults
-            if not isinstance(fault, MissingTooth) and not missing_length(fault, planetary_set)
-        ]
+        faults = [fault for fault in deviations.faults if not isinstance(fault, MissingTooth | Spall)]
         whole = replace(deviations, faults=tuple(faults))
     windows_of_meshes, teeth = [], []
     for direction in (DRIVE_SIDE, BACK_SIDE) if both_flanks else (DRIVE_SIDE,):
@@ -276,7 +272,7 @@ def _over_gaps(
     """
     faults, wide = () if deviations is None else deviations.faults, list(widths)
     for kind, (pair, mates) in enumerate(zip(pairs, planetary_set.mates, strict=True)):
-        length = max((missing_length(fault, planetary_set) for fault in faults if fault.gear in mates), default=0.0)
+        length = sum(missing_length(faults, planetary_set, number, widths[kind]) for number in mates)
         if length:
             wide[kind] += 2.0 * min(length, 0.5 * length + _largest_radius(pair) * nearest / length)
     most = max(wider / width for wider, width in zip(wide, widths, strict=True))

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, ClassVar, TypeVar
 import numpy as np
 
 if TYPE_CHECKING:
+    from femgear.gears.gear import Gear
     from femgear.gears.pair import GearSet
 
 LEFT, RIGHT = 0, 1
@@ -152,14 +153,41 @@ class Crack(ToothFault):
         return self.start, self.angle, self.depth
 
 
-def missing_length(fault: ToothFault, gears: GearSet) -> float:
-    """Find the length of the part amid a flank that stands back [m], along the flank; zero of others than pits."""
-    if not isinstance(fault, Spall):
-        return 0.0
-    gear = gears.gears[fault.gear]
+def removed(faults: Sequence[ToothFault], roll: np.ndarray) -> np.ndarray:
+    """Compute what faults of one flank take off together [m] at roll lengths (...) [m].
+
+    A pit is as deep as its tooth is worn and its own depth; where pits lie over one another the deeper counts.
+    """
+    pits = [fault.removed(roll) for fault in faults if isinstance(fault, Spall)]
+    apart = sum((fault.removed(roll) for fault in faults if not isinstance(fault, Spall)), np.zeros(np.shape(roll)))
+    return apart + np.max(pits, axis=0) if pits else apart
+
+
+def flank_beside(gear: Gear, roll: float) -> tuple[float, float]:
+    """Find the lengths of a flank [m] from a roll length [m] on it to its ends: that of smaller ones first."""
     low, high = sorted((gear.form_roll, gear.tip_roll))
-    low, high = max(low, fault.low), min(high, fault.high)
-    return max(high**2 - low**2, 0.0) / (2.0 * gear.base_radius)
+    return (roll**2 - low**2) / (2.0 * gear.base_radius), (high**2 - roll**2) / (2.0 * gear.base_radius)
+
+
+def missing_length(faults: Sequence[ToothFault], gears: GearSet, gear: int, land: float) -> float:
+    """Find the longest part amid a flank of a gear that stands back [m], along the flank; zero without pits.
+
+    Pits of one flank with less than ``land`` [m] of it between them count as one.
+    """
+    pits = dict[tuple[int, int | None, int | None], list[Spall]]()
+    for fault in faults:
+        if isinstance(fault, Spall) and fault.gear == gear:
+            pits.setdefault((fault.copy, fault.tooth, fault.flank), []).append(fault)
+    of_gear, longest = gears.gears[gear], 0.0
+    ends = sorted((of_gear.form_roll, of_gear.tip_roll))
+    for of_flank in pits.values():
+        low = high = -np.inf
+        for pit in sorted(of_flank, key=lambda pit: pit.low):
+            if (pit.low**2 - high**2) / (2.0 * of_gear.base_radius) > land or np.isinf(high):
+                low, high = max(ends[0], pit.low), -np.inf
+            high = max(high, min(ends[1], pit.high))
+            longest = max(longest, (high**2 - low**2) / (2.0 * of_gear.base_radius))
+    return float(longest)
 
 
 def fault_periods(faults: Sequence[ToothFault], gear: int, teeth: int) -> int:
@@ -171,6 +199,8 @@ def fault_form(
     faults: Sequence[ToothFault], gears: GearSet, kind: int, tooth: np.ndarray, sides: np.ndarray
 ) -> Callable | None:
     """Separation [m] by the faults of teeth as a function of both roll lengths [m], or None.
+
+    What both flanks lack adds up, and of each flank what `removed` says.
 
     Parameters
     ----------
@@ -195,9 +225,15 @@ def fault_form(
     def separation(roll_1, roll_2):
         rolls = np.broadcast_arrays(roll_1, roll_2)
         apart = np.zeros(rolls[0].shape)
+        pits = [apart.copy(), apart.copy()] if any(isinstance(fault, Spall) for fault, *_ in acting) else []
         for fault, place, on in acting:
-            apart[on] += fault.removed(rolls[place][on])
-        return apart
+            taken = fault.removed(rolls[place][on])
+            if isinstance(fault, Spall):
+                # of pits that lie over one another the deeper counts
+                pits[place][on] = np.maximum(pits[place][on], taken)
+            else:
+                apart[on] += taken
+        return sum(pits, apart)
 
     return separation
 

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -11,7 +12,7 @@ import numpy as np
 from femgear.case.quantities import LENGTH, to_si
 from femgear.contact.flank_pairs import acting_flanks, mesh_pairs
 from femgear.errors import CaseError
-from femgear.gears.faults import RIGHT
+from femgear.gears.faults import RIGHT, flank_beside
 
 if TYPE_CHECKING:
     from femgear.gears.planetary import PlanetarySet
@@ -26,7 +27,7 @@ _RANGES = {"crack": (0.2, 1.2), "spall": (0.2, 0.6), "broken corner": (0.1, 0.4)
 _SPALL_DEPTH = 0.05
 """Of a spall [modules]."""
 _LEFT_OVER = 0.9
-"""Share of the height of a flank that may be broken off."""
+"""Share of the height of a flank that may be broken off, and of the room about a pit."""
 
 
 @dataclass(frozen=True)
@@ -119,17 +120,25 @@ def drawn_fault(
     if kind in SIZED:
         low, high = sizes[kind]
         size = low + (high - low) * float(shares[4])
-    if kind == "broken corner":
-        faulty = getattr(gears, gear)
-        size = min(size, _LEFT_OVER * abs(faulty.tip_radius - faulty.form_radius))
-    return FaultPlace(
+    fault = FaultPlace(
         kind,
         gear,
         1 + int(shares[1] * gears.n_planets) if gear == "planet" else 0,
         -1 if kind == "wear" else int(shares[2] * teeth),
         flanks[int(shares[3] * len(flanks))] if kind in ("crack", "spall", "wear") else "",
-        float(f"{size:.6g}"),
     )
+    return replace(fault, size=float(f"{min(size, _largest(fault, gears)):.6g}"))
+
+
+def _largest(fault: FaultPlace, gears: PlanetarySet) -> float:
+    """Largest size of a fault [m]: a flank has room for it."""
+    if fault.kind == "broken corner":
+        faulty = getattr(gears, fault.gear)
+        return _LEFT_OVER * abs(faulty.tip_radius - faulty.form_radius)
+    if fault.kind == "spall":
+        gear, radius = getattr(gears, fault.gear), _pitch_radius(gears, fault)
+        return _LEFT_OVER * 2.0 * min(flank_beside(gear, math.sqrt(radius**2 - gear.base_radius**2)))
+    return math.inf
 
 
 def fault_entries(fault: FaultPlace, gears: PlanetarySet) -> dict[str, list[dict[str, object]]]:

@@ -82,7 +82,7 @@ def test_faults_are_made_of_their_gears(healthy):
     spall, missing, of_planet, tip = set_deviations(case).faults
     gears = planetary_set(case)
     assert isinstance(spall, Spall) and (spall.gear, spall.tooth, spall.flank) == (0, 3, LEFT)
-    assert missing_length(spall, gears) == pytest.approx(0.5e-3, rel=1e-12)
+    assert missing_length([spall], gears, 0, 0.0) == pytest.approx(0.5e-3, rel=1e-12)
     assert isinstance(missing, MissingTooth) and missing.flank is None
     assert (of_planet.gear, of_planet.copy, of_planet.flank) == (1, 1, RIGHT)
     assert isinstance(tip, BrokenTip)
@@ -141,3 +141,102 @@ def test_given_mesh_stiffnesses_and_bodies_of_one_period_refuse_faults_of_a_toot
     with pytest.raises(CaseError) as refused:
         check_case(case)
     assert refused.value.code in ("E-FAULT", "E-PERIODS")
+
+
+CORNER = {"kind": "broken corner", "tooth": 3, "length": "1 mm"}
+GAP = {"kind": "missing", "tooth": 3}
+
+
+def refusals(healthy, *faults, gear="sun"):
+    case = with_values(healthy, {f"{gear}.fault": list(faults)})
+    with pytest.raises(GeometryError) as refused:
+        set_deviations(case)
+    return refused.value.problems
+
+
+@pytest.mark.parametrize(
+    ("changed", "key", "words", "limit"),
+    [
+        # over the tip by a fifth of a millimetre, and as far below the flank
+        ({"diameter": "44.4 mm", "length": "1 mm"}, "length", "over the tip", "up to 0."),
+        ({"diameter": "39.6 mm", "length": "1 mm"}, "length", "below the flank", "up to 0."),
+        ({"length": "20 mm"}, "length", "below the flank", "the whole flank is 3.3091 mm long"),
+        ({"depth": "40 mm"}, "depth", "leaves no tooth", "as thick as the tooth is"),
+    ],
+)
+def test_pits_that_no_flank_has_room_for_are_refused(healthy, changed, key, words, limit):
+    (problem,) = refusals(healthy, SPALL | changed)
+    assert (problem.code, problem.key) == ("E-FAULT", f"sun.fault[0].{key}")
+    assert words in problem.message and limit in problem.limit and problem.value and problem.remedy and problem.file
+
+
+def test_a_pit_may_reach_the_ends_of_its_flank(healthy):
+    sun = planetary_set(healthy).sun
+    arc = (sun.tip_roll**2 - sun.form_roll**2) / (2 * sun.base_radius)
+    amid = 2e3 * np.hypot(sun.base_radius, np.sqrt(0.5 * (sun.tip_roll**2 + sun.form_roll**2)))
+    whole = SPALL | {"diameter": f"{amid:.12g} mm", "length": f"{1e3 * arc:.12g} mm"}
+    (spall,) = set_deviations(with_values(healthy, {"sun.fault": [whole]})).faults
+    assert isinstance(spall, Spall)
+    assert (spall.low, spall.high) == pytest.approx((sun.form_roll, sun.tip_roll), rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("faults", "words"),
+    [
+        ((GAP, CRACK), "tooth 3 is missing, and has no other fault"),
+        ((CORNER, GAP), "tooth 3 is missing, and has no other fault"),
+        ((GAP, GAP), "tooth 3 is missing twice"),
+        ((CORNER, CORNER | {"length": "0.5 mm"}), "broken off twice"),
+        ((CRACK, CRACK | {"flank": "right"}), "a body has one crack"),
+        ((WEAR | {"tooth": 3}, GAP), "tooth 3 is missing, and has no other fault"),
+        ((CORNER, SPALL | {"diameter": "43 mm", "length": "0.6 mm"}), "where the corner of tooth 3 is broken off"),
+        ((SPALL | {"depth": "1.9 mm"}, SPALL | {"flank": "right", "depth": "1.9 mm"}), "leave nothing of tooth 3"),
+        ((WEAR | {"depth": "0.5 mm"}, WEAR | {"flank": "right", "depth": "0.5 mm"}), "leave nothing of all its teeth"),
+    ],
+)
+def test_faults_of_one_tooth_that_contradict_are_refused_at_the_later_one(healthy, faults, words):
+    (problem,) = refusals(healthy, *faults)
+    assert problem.code == "E-FAULT" and words in problem.message
+    assert problem.key.startswith("sun.fault[1].") and problem.limit and problem.remedy and problem.file
+
+
+@pytest.mark.parametrize(
+    "faults",
+    [
+        (SPALL, SPALL | {"diameter": "41 mm"}),
+        (SPALL, SPALL | {"depth": "60 um"}),
+        (WEAR, SPALL),
+        (GAP, WEAR),
+        (GAP, GAP | {"tooth": 4}, CRACK | {"tooth": 9}),
+        (CORNER, SPALL | {"diameter": "41 mm"}, CRACK),
+    ],
+)
+def test_faults_that_can_be_at_once_are_allowed(healthy, faults):
+    assert len(set_deviations(with_values(healthy, {"sun.fault": list(faults)})).faults) == len(faults)
+
+
+def test_pits_of_internal_teeth_end_at_their_smaller_tip_circle(healthy):
+    ring = planetary_set(healthy).ring
+    spall = SPALL | {"diameter": f"{2e3 * ring.tip_radius + 0.6:.6f} mm"}
+    (over,) = refusals(healthy, spall | {"length": "1.5 mm"}, gear="ring")
+    assert "over the tip" in over.message
+    (broken,) = refusals(healthy, spall | {"length": "0.2 mm"}, CORNER, gear="ring")
+    assert "broken off" in broken.message and "down to" in broken.limit
+
+
+def test_all_faults_that_cannot_be_are_told_at_once(healthy):
+    faults = {
+        "sun.fault": [SPALL | {"depth": "40 mm"}, GAP | {"tooth": 40}, CORNER, CORNER],
+        "ring.fault": [CORNER | {"length": "4 mm"}],
+    }
+    with pytest.raises(GeometryError) as refused:
+        set_deviations(with_values(healthy, faults))
+    keys = [problem.key for problem in refused.value.problems]
+    assert keys == ["sun.fault[0].depth", "sun.fault[1].tooth", "sun.fault[3].kind", "ring.fault[0].length"]
+    assert "4 problems" in str(refused.value) and str(refused.value).count("remedy") == 4
+
+
+def test_wear_of_no_depth_anywhere_is_none(healthy):
+    points = {"depths": ["0 um", "0 um"], "diameters": ["41 mm", "43 mm"]}
+    none = {"kind": "wear", "flank": "left", "tooth": 3} | points
+    assert set_deviations(with_values(healthy, {"sun.fault": [none]})).ideal

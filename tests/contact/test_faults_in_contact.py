@@ -123,3 +123,22 @@ def test_tips_broken_off_all_teeth_make_a_gear_with_another_tip(gears, bodies, n
     assert broken.sun_arc == pytest.approx(shorter.sun_arc, rel=1e-5)  # where gears are held to rest
     assert broken.stiffness == pytest.approx(shorter.stiffness, rel=1e-4)
     assert (broken.sun_arc > walk(gears, bodies, periods=1).sun_arc).any()
+
+
+def test_pits_and_wear_over_one_another_are_the_gaps_that_they_make_together(gears, bodies):
+    """The deeper of two pits counts, wear adds: entries of the same gaps written by hand carry the same loads."""
+    first = Spall(0, 0, 3, LEFT, low=8.2e-3, high=8.8e-3, depth=2e-6)
+    second = Spall(0, 0, 3, LEFT, low=8.5e-3, high=9.2e-3, depth=5e-6)
+    worn = Wear(0, 0, None, LEFT, roll=(0.0, 1.0), depth=(4e-6, 4e-6))
+    again = Wear(0, 0, 3, LEFT, roll=(8e-3, 9e-3), depth=(0.0, 3e-6))
+    together = walk(gears, bodies, first, second, worn, again)
+    by_hand = (
+        Spall(0, 0, 3, LEFT, low=8.2e-3, high=float(np.nextafter(8.5e-3, 0.0)), depth=2e-6),
+        Spall(0, 0, 3, LEFT, low=8.5e-3, high=9.2e-3, depth=5e-6),
+        *(Wear(0, 0, tooth, LEFT, roll=(0.0, 1.0), depth=(4e-6, 4e-6)) for tooth in range(27) if tooth != 3),
+        Wear(0, 0, 3, LEFT, roll=(8e-3, 9e-3), depth=(4e-6, 7e-6)),
+    )
+    written = walk(gears, bodies, *by_hand)
+    assert together.sun_arc == pytest.approx(written.sun_arc, rel=1e-12)
+    assert together.tooth_load == pytest.approx(written.tooth_load, abs=1e-9 * written.tooth_load.max())
+    assert np.ptp(together.sun_arc) > 1.5 * np.ptp(walk(gears, bodies, worn, periods=1).sun_arc)

@@ -59,5 +59,5 @@ def test_windows_reach_over_a_pit_to_both_sides_of_it():
     whole = mesh_windows(gears, bodies, **options)
     over = mesh_windows(gears, bodies, **options, deviations=replace(no_deviations(gears), faults=(pit,)))
     widths = [setup.cell_area[:, 0].sum(axis=-1) / gears.sun.face_width for setup in (whole, over)]
-    assert widths[1][:3] - widths[0][:3] == pytest.approx(2.0 * missing_length(pit, gears), rel=1e-9)
+    assert widths[1][:3] - widths[0][:3] == pytest.approx(2.0 * missing_length([pit], gears, 0, 0.0), rel=1e-9)
     assert widths[1][3:] == pytest.approx(widths[0][3:], rel=1e-9) and over.cells > whole.cells

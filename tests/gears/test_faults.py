@@ -18,6 +18,7 @@ from femgear.gears.faults import (
     fault_periods,
     flank_limits,
     missing_length,
+    removed,
 )
 from femgear.gears.planetary import mirrored_set
 from validation.planetary import reference_set
@@ -58,9 +59,42 @@ def test_a_broken_tip_ends_the_flank_of_its_tooth_alone(gears):
 
 def test_lengths_of_missing_parts_are_arcs_of_the_involute(gears):
     sun = gears.sun
-    assert missing_length(SPALL, gears) == pytest.approx((6e-3**2 - 5e-3**2) / (2 * sun.base_radius))
-    assert missing_length(replace(SPALL, high=1.0), gears) < (sun.tip_roll**2) / (2 * sun.base_radius)
-    assert missing_length(MissingTooth(0, 0, 3, None), gears) == 0.0
+    assert missing_length([SPALL], gears, 0, 0.0) == pytest.approx((6e-3**2 - 5e-3**2) / (2 * sun.base_radius))
+    assert missing_length([replace(SPALL, high=1.0)], gears, 0, 0.0) < (sun.tip_roll**2) / (2 * sun.base_radius)
+    assert missing_length([MissingTooth(0, 0, 3, None)], gears, 0, 0.0) == 0.0 == missing_length([SPALL], gears, 1, 0.0)
+
+
+def test_pits_with_little_flank_between_them_count_as_one(gears):
+    beside = replace(SPALL, low=6.2e-3, high=7e-3)
+    land, whole = ((high**2 - low**2) / (2 * gears.sun.base_radius) for low, high in ((6e-3, 6.2e-3), (5e-3, 7e-3)))
+    assert missing_length([beside, SPALL], gears, 0, 1.01 * land) == pytest.approx(whole)
+    apart = (7e-3**2 - 6.2e-3**2) / (2 * gears.sun.base_radius)
+    alone = missing_length([SPALL], gears, 0, 0.0)
+    assert missing_length([beside, SPALL], gears, 0, 0.99 * land) == max(alone, apart)
+    others = replace(beside, tooth=4), replace(beside, flank=RIGHT), replace(beside, copy=1)
+    assert missing_length([SPALL, *others], gears, 0, 1.0) == max(alone, apart)
+    assert missing_length([replace(SPALL, high=8e-3), beside], gears, 0, 0.0) == pytest.approx(
+        (8e-3**2 - 5e-3**2) / (2 * gears.sun.base_radius)
+    )
+
+
+def test_the_deeper_of_two_pits_counts_and_wear_adds(gears):
+    """Gaps by hand: 40 um and 60 um of pits that lie over one another, 8 um of wear and 3 um more, 5 um of the mate."""
+    deeper = replace(SPALL, low=5.4e-3, high=6.2e-3, depth=60e-6)
+    worn = Wear(0, 0, None, LEFT, roll=(0.0, 1.0), depth=(8e-6, 8e-6))
+    again = replace(worn, tooth=3, depth=(3e-6, 3e-6))
+    roll = np.array([4.9e-3, 5.2e-3, 5.5e-3, 6.1e-3, 6.3e-3])
+    alone = np.array([0.0, 40e-6, 60e-6, 60e-6, 0.0])
+    assert removed([SPALL, deeper], roll) == pytest.approx(alone, rel=1e-15)
+    assert removed([worn, SPALL, again, deeper], roll) == pytest.approx(alone + 11e-6, rel=1e-15)
+    tooth, sides = np.zeros((2, 3, 1, 1), int), np.zeros((2, 3), int)
+    tooth[0] = 3
+    mate = Wear(1, 0, None, LEFT, roll=(0.0, 1.0), depth=(5e-6, 5e-6))
+    form = fault_form((deeper, worn, mate, SPALL, again), gears, 0, tooth, sides)
+    assert form is not None
+    rolls = np.broadcast_to(roll, (3, 1, 1, 5))
+    mates = [5e-6 if mesh.copy == 0 else 0.0 for mesh in gears.meshes if mesh.kind == 0]
+    assert form(rolls, rolls)[:, 0, 0] == pytest.approx(alone + 11e-6 + np.array(mates)[:, None], rel=1e-14)
 
 
 @pytest.mark.parametrize(("gear", "periods"), [(0, 27), (1, 40), (2, 108)])

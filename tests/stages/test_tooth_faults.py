@@ -152,3 +152,13 @@ def test_faults_that_drawings_do_not_show_are_named(healthy):
     assert list(undrawn_faults(case)) == ["sun.fault[1] (wear)"]
     (block,) = describe_faults(case, None)
     assert block.notes == ("sun.fault[1] (wear): drawings have the tooth whole",)
+
+
+def test_faults_that_a_stage_of_a_gearbox_cannot_have_are_refused_where_they_stand():
+    tables = gearbox_of_case(read_case(CASES / "spur_pair.toml")).tables
+    spall = {"kind": "spall", "tooth": 3, "flank": "left", "diameter": "72 mm", "length": "1 mm", "depth": "40 mm"}
+    tables["pair"][0]["teeth"]["gear_1"]["fault"] = [spall, {"kind": "missing", "tooth": 90}]
+    with pytest.raises(CaseError) as refused:
+        parse_case(case_text.write(tables), name="box")
+    keys = [problem.key for problem in refused.value.problems]
+    assert keys == ["pair[0].teeth.gear_1.fault[0].depth", "pair[0].teeth.gear_1.fault[1].tooth"]

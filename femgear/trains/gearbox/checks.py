@@ -6,6 +6,7 @@ import math
 from collections.abc import Iterator, Sequence
 
 from femgear.case.fault_sections import no_faults
+from femgear.case.gear_set import set_deviations
 from femgear.case.load_spectrum import check_running_shares
 from femgear.case.messages import no_such
 from femgear.case.quantities import LENGTH
@@ -444,8 +445,11 @@ def _stages(case: GearboxCase) -> Iterator[CaseError]:
             try:
                 pair = isinstance(stage, PairSection)
                 yield from _pair(case, stage, key) if pair else _planetary(case, stage, key)
-                if stage.teeth is not None and not case.deflection.contact:
-                    no_faults(teeth_of(stage), _NO_CONTACT, "leave deflection.contact out")
+                if stage.teeth is not None:
+                    teeth = teeth_of(stage)
+                    if not case.deflection.contact:
+                        no_faults(teeth, _NO_CONTACT, "leave deflection.contact out")
+                    set_deviations(teeth)
             except FemgearError as error:
                 where = f"{key}.{'teeth' if stage.teeth is not None else 'gears'}"
                 yield from (

@@ -26,12 +26,16 @@ def test_a_pair_as_a_gearbox_has_lines_at_all_turns_of_the_faulty_gear():
 
 
 @pytest.mark.slow
-def test_a_crack_without_depth_and_a_list_without_faults_change_not_one_bit():
-    case = with_values(FaultySet((16, 16, 48), 4, "sun").case, {"sun.fault": []})
+def test_faults_without_depth_and_a_list_without_faults_change_not_one_bit():
+    case = FaultySet((16, 16, 48), 4, "sun").case
     crack = {"kind": "crack", "tooth": 2, "flank": "left", "depth": "0 mm"}
+    spall = {"kind": "spall", "tooth": 2, "flank": "left", "diameter": "32 mm", "length": "0.5 mm", "depth": "0 um"}
+    worn = {"kind": "wear", "tooth": 5, "flank": "left", "diameters": ["31 mm", "33 mm"], "depths": ["0 um", "0 um"]}
+    nothing, without_depth = ([], [crack, spall, worn, worn | {"tooth": 2}])
+    case = with_values(case, {"sun.fault": nothing})
     healthy, *others = (
-        solve(with_values(case, change), only="static")["static"].dataset()
-        for change in ({}, {"sun.fault": []}, {"sun.fault": [crack]})
+        solve(with_values(case, {"sun.fault": faults}), only="static")["static"].dataset()
+        for faults in (nothing, nothing, without_depth)
     )
     for data in others:
         assert data.identical(healthy)
