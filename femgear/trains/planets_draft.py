@@ -43,8 +43,8 @@ _MOST_PAIRS = 20
 """Pairs of a gearbox."""
 _ROOM = 1.0 - 1e-9
 """Least gap between tips that do not mesh [modules]."""
-_SHAFT = 0.6
-"""Outer diameter of shafts over the root circle of their smallest gear."""
+_SHAFT, _CLEARANCE = 0.6, 0.25
+"""Outer diameter of shafts over the root circle of their smallest gear; gap to tips that they pass [modules]."""
 
 
 @dataclass(frozen=True)
@@ -235,7 +235,9 @@ class _Tables:
             axis = radius * math.cos(at), radius * math.sin(at)
             root = min(scale * self.module * (gear.teeth - 2.5) for gear, scale in self.gears_of(name))
             shaft = f"{name} {number + 1}"
-            self.shaft(shaft, axis, -0.5 * self.width, self.length + self.width, _SHAFT * root)
+            outer, room = _SHAFT * root, 2.0 * self.module * (_beside_shaft(self.layout, name) - _CLEARANCE)
+            narrow = f"{_CLEARANCE:g} modules beside the tips that it passes" if 0.0 < room < outer else ""
+            self.shaft(shaft, axis, -0.5 * self.width, self.length + self.width, room if narrow else outer, narrow)
             for side, place in (("A", 0.25 * self.width), ("B", self.length + 0.75 * self.width)):
                 where = LENGTH.show(round(place - 0.5 * self.width - 0.5 * self.length, 9))
                 self.bearing(shaft, place, f"{shaft} {side}", axial=side == "A", outer_position=where)
@@ -282,9 +284,12 @@ class _Tables:
         """Radius of a shaft, the bore of its gears."""
         return LENGTH.show(round(0.5 * to_si(shaft["part"][0]["outer_diameter"], LENGTH), 9))
 
-    def shaft(self, name: str, axis: tuple[float, float], start: float, length: float, diameter: float) -> None:
+    def shaft(
+        self, name: str, axis: tuple[float, float], start: float, length: float, diameter: float, how: str = ""
+    ) -> None:
         """Add a cylindrical shaft."""
-        self.notes[f"shaft[{len(self.shafts)}].part[0].outer_diameter"] = f"estimated: {_SHAFT:g} of the root circle"
+        how = how or f"{_SHAFT:g} of the root circle"
+        self.notes[f"shaft[{len(self.shafts)}].part[0].outer_diameter"] = f"estimated: {how}"
         part = {"length": LENGTH.show(round(length, 9)), "outer_diameter": LENGTH.show(round(diameter, 4))}
         # axes stand at the centre distances of their teeth, to the picometre
         place = [f"{round(1e3 * value, 9):.13g} mm" for value in axis]
@@ -412,6 +417,24 @@ def _room(layout: _Layout, planets: int) -> tuple[float, str, str]:
             gaps = [radius - tip - other_tip]
         smallest = min(smallest, (min(gaps, default=math.inf), gear.body, other.body))
     return smallest
+
+
+def _beside_shaft(layout: _Layout, name: str) -> float:
+    """Smallest distance from the axis of a planet to tips of gears that it does not mesh with [modules].
+
+    Gears of suns and of the other planets of its branch: its shaft passes them in their planes.
+    """
+    mates = {frozenset((first.body, second.body)) for first, second, _ in layout.meshes}
+    radius, angle = layout.planets[name]
+    distances = [math.inf]
+    for *mesh, scale in layout.meshes:
+        for gear in mesh:
+            if gear.body == name or frozenset((gear.body, name)) in mates or "ring" in gear.body:
+                continue
+            far, beside = layout.planets.get(gear.body, (0.0, 0.0))
+            axes = math.dist(_place(radius, angle), _place(far, beside))
+            distances.append(axes - scale * (0.5 * gear.teeth + 1.0))
+    return min(distances)
 
 
 def _place(radius: float, angle: float) -> tuple[float, float]:

@@ -166,3 +166,13 @@ def test_the_teeth_of_a_ring_may_be_negative():
 def test_rings_that_turn_alike_make_no_wolfrom_set():
     with pytest.raises(CaseError, match="ratio is infinite"):
         new_case("wolfrom", teeth=(18, 27, 72, 27, 72))
+
+
+@pytest.mark.parametrize("teeth", [(28, 36, 17, 18, 72), (30, 38, 18, 18, 74)])
+def test_shafts_of_short_planets_pass_the_large_sun(teeth):
+    case = parse_case(new_case("ravigneaux", teeth=teeth, planets=4))
+    assert not [finding for finding in gearbox_warnings(case) if finding.code == "W-OVERLAP"]
+    short = next(shaft for shaft in case.shaft if shaft.name == "short planet 1")
+    # two of half the teeth of small sun and short planet, less the tip of the large sun and a quarter of a module
+    room = 2e-3 * ((teeth[0] + teeth[2]) / 2 - (teeth[1] / 2 + 1) - 0.25)
+    assert short.part[0].outer_diameter == pytest.approx(2 * room)
