@@ -10,7 +10,7 @@ import json
 import warnings
 from collections.abc import Iterable
 from dataclasses import KW_ONLY, dataclass, field, fields, replace
-from typing import Any
+from typing import Any, NamedTuple
 
 from femgear.errors import printable
 
@@ -18,105 +18,553 @@ NOTE, DOUBT, FAULT = "note", "doubt", "fault"
 SEVERITIES = (NOTE, DOUBT, FAULT)
 """From the least to the most severe: worth knowing; a number may be wrong; nothing real carries that."""
 
+
+class Meaning(NamedTuple):
+    """What a code means.
+
+    Parameters
+    ----------
+    severity : str
+        One of `SEVERITIES`, unless a finding has its own.
+    sentence : str
+        What it is about.
+    words : str
+        The same in few words, beside a number that it concerns.
+    advice : str
+        What to do about it where a finding names nothing of its own; a sentence.
+    """
+
+    severity: str
+    sentence: str
+    words: str
+    advice: str
+
+
 CATALOGUE = {
-    "W-BACK": (NOTE, "Meshes carry on their back flanks."),
-    "W-BACKLASH": (NOTE, "Contact loss is asked for where teeth have no back side, or there are no meshes."),
-    "W-BALANCE": (DOUBT, "A harmonic balance did not converge."),
-    "W-BEARING": (NOTE, "Bearings are missing, or one has a property that a stage does not take."),
-    "W-BRANCH": (DOUBT, "The curve of a response breaks off."),
-    "W-CHAOS": (DOUBT, "Neighbouring motions move apart: details of the record depend on the steps."),
-    "W-CLEARANCE": (NOTE, "A tip comes close to the root of its mate."),
-    "W-CLIPPING": (DOUBT, "Samples of a sound exceed its full scale."),
-    "W-COMPILER": (NOTE, "A functional mock-up unit has no binary."),
-    "W-CONTACT-POINTS": (DOUBT, "The mesh forces on both gears do not act on one line."),
-    "W-CONTACT-RATIO": (NOTE, "The contact ratio is low."),
-    "W-CONVERGENCE": (DOUBT, "A periodic solution did not converge."),
-    "W-COUPLING": (NOTE, "The torque turns a coupling further than couplings go."),
-    "W-CROSS": (DOUBT, "Stages change one another by more than a response stage by stage may leave out."),
-    "W-DAMPING": (DOUBT, "Without damping resonances have no limit."),
-    "W-DEFLECTION": (DOUBT, "Deflections are no longer small; in a gearbox a fault where ten times over the limit."),
-    "W-EDGE": (DOUBT, "Contacts lie at the end of a flank, where the pressure has no limit."),
-    "W-ENDS": (DOUBT, "Free ends of the teeth make meshes softer than the model has them."),
-    "W-ESTIMATED": (NOTE, "Values that were left out are estimated."),
-    "W-EXCITATION": (
+    "W-BACK": Meaning(
+        NOTE,
+        "Meshes carry on their back flanks.",
+        "back flanks carry",
+        "Look at errors and play of the planets: some of them work against the others.",
+    ),
+    "W-BACKLASH": Meaning(
+        NOTE,
+        "Contact loss is asked for where teeth have no back side, or there are no meshes.",
+        "no back side to meet",
+        "Give set.backlash, or leave contact loss out.",
+    ),
+    "W-BALANCE": Meaning(
+        DOUBT,
+        "A harmonic balance did not converge.",
+        "a balance is missed",
+        "Take fewer harmonics, more damping or smaller steps, and do not use its numbers before.",
+    ),
+    "W-BEARING": Meaning(
+        NOTE,
+        "Bearings are missing, or one has a property that a stage does not take.",
+        "a bearing is missing or in part left out",
+        "Give the bearing, or read results as those without that property.",
+    ),
+    "W-BRANCH": Meaning(
+        DOUBT,
+        "The curve of a response breaks off.",
+        "the curve breaks off",
+        "Begin from the other end, or give more damping: what lies beyond is not known.",
+    ),
+    "W-CHAOS": Meaning(
+        DOUBT,
+        "Neighbouring motions move apart: details of the record depend on the steps.",
+        "details depend on the steps",
+        "Compare two values of transient.rate, and use means and largest values alone.",
+    ),
+    "W-CLEARANCE": Meaning(
+        NOTE,
+        "A tip comes close to the root of its mate.",
+        "little tip clearance",
+        "Give tip_diameter or a deeper dedendum, if the drawing has more room.",
+    ),
+    "W-CLIPPING": Meaning(
+        DOUBT,
+        "Samples of a sound exceed its full scale.",
+        "sound beyond its full scale",
+        "Raise the full scale that the message names, and export again.",
+    ),
+    "W-COMPILER": Meaning(
+        NOTE,
+        "A functional mock-up unit has no binary.",
+        "no binary in the unit",
+        "Install a C compiler and export again, or let the tool that reads the unit compile it.",
+    ),
+    "W-CONTACT-POINTS": Meaning(
+        DOUBT,
+        "The mesh forces on both gears do not act on one line.",
+        "mesh forces off one line",
+        'Write helical.contact_points = "pitch_point".',
+    ),
+    "W-CONTACT-RATIO": Meaning(
+        NOTE,
+        "The contact ratio is low.",
+        "low contact ratio",
+        "Give longer teeth or smaller profile shifts; noise and loads of single teeth are high.",
+    ),
+    "W-CONVERGENCE": Meaning(
+        DOUBT,
+        "A periodic solution did not converge.",
+        "a speed did not converge",
+        "Leave these speeds out, or give more damping; their numbers hold nothing.",
+    ),
+    "W-COUPLING": Meaning(
+        NOTE,
+        "The torque turns a coupling further than couplings go.",
+        "the coupling turns far",
+        "Give the stiffness of the coupling of your catalogue.",
+    ),
+    "W-CROSS": Meaning(
+        DOUBT,
+        "Stages change one another by more than a response stage by stage may leave out.",
+        "stages shake one another",
+        "Compute the stages together in time, with [transient], or read levels with that margin.",
+    ),
+    "W-DAMPING": Meaning(
+        DOUBT,
+        "Without damping resonances have no limit.",
+        "no damping",
+        "Give a damping ratio; 0.02 to 0.05 is usual of gear trains.",
+    ),
+    "W-DEFLECTION": Meaning(
+        DOUBT,
+        "Deflections are no longer small; in a gearbox a fault where ten times over the limit.",
+        "large deflections",
+        "Stiffen shafts and bearings where the message says, or take less torque.",
+    ),
+    "W-EDGE": Meaning(
+        DOUBT,
+        "Contacts lie at the end of a flank, where the pressure has no limit.",
+        "contact at the end of a flank",
+        "Do not use the pressure there; a relief or a crowning moves the contact inwards.",
+    ),
+    "W-ENDS": Meaning(
+        DOUBT,
+        "Free ends of the teeth make meshes softer than the model has them.",
+        "free ends of teeth left out",
+        "Read stiffness and load distribution with the margin of the message.",
+    ),
+    "W-ESTIMATED": Meaning(
+        NOTE,
+        "Values that were left out are estimated.",
+        "estimated values",
+        "Give what is known of them in the case file: vibration and levels rest on masses and stiffnesses.",
+    ),
+    "W-EXCITATION": Meaning(
         DOUBT,
         "The excitation ends below what levels need, or nothing excites.",
+        "excitation falls short",
+        "Raise dynamics.up_to, or read the number as one that may be higher by what the message says.",
     ),
-    "W-FACE-LOAD": (DOUBT, "Slices are too wide for the load distribution over the face width."),
-    "W-FAULT": (DOUBT, "A fault of a tooth has effects that the model leaves out, or none that shows."),
-    "W-FILLET": (NOTE, "A tip runs into the root fillet of its mate by a little."),
-    "W-FORMER": (NOTE, "A file of a former model is read as one of today."),
-    "W-FOUNDATION": (
+    "W-FACE-LOAD": Meaning(
+        DOUBT,
+        "Slices are too wide for the load distribution over the face width.",
+        "load over the width is coarse",
+        "Take more slices, or stiffer shafts and bearings where the face width lifts.",
+    ),
+    "W-FAULT": Meaning(
+        DOUBT,
+        "A fault of a tooth has effects that the model leaves out, or none that shows.",
+        "fault of a tooth in part left out",
+        "Take orders and places as they are, and sizes with the margin of the message.",
+    ),
+    "W-FILLET": Meaning(
+        NOTE,
+        "A tip runs into the root fillet of its mate by a little.",
+        "a tip meets a fillet",
+        "Give a smaller tip diameter, or another rounding of the tool.",
+    ),
+    "W-FORMER": Meaning(
+        NOTE,
+        "A file of a former model is read as one of today.",
+        "file of a former model",
+        "femgear gearbox FILE writes it with the entries of today.",
+    ),
+    "W-FOUNDATION": Meaning(
         DOUBT,
         "A model for other programs has the ring on its foundation, not on supports or in a casing.",
+        "ring on its foundation alone",
+        "Take levels at sensors from a run, and the model for teeth and shafts.",
     ),
-    "W-FREE": (DOUBT, "More modes have no stiffness than a gearbox has ways to turn."),
-    "W-FRICTION": (DOUBT, "Friction acts at all speeds with the coefficient of one of them."),
-    "W-GROWTH": (DOUBT, "The free motion grows: a parametric resonance."),
-    "W-HEAT": (DOUBT, "Teeth are hotter, or their oil film thinner, than the oil is good for."),
-    "W-HELIX": (DOUBT, "The helix angle lies outside what is validated."),
-    "W-JOURNAL": (NOTE, "Lines of a journal were damaged and are left out."),
-    "W-KINK": (DOUBT, "A stress stands at a kink, or at an end of what was searched."),
-    "W-LIFE": (FAULT, "Teeth or bearings fail before the life that the case asks for."),
-    "W-LIFTED": (NOTE, "Parts of the face width never carry."),
-    "W-LOAD": (NOTE, "Without load nothing keeps the flanks on one side."),
-    "W-LOSSES": (NOTE, "Losses of a part are left out, or rest on a simpler model."),
-    "W-MATERIAL": (DOUBT, "Safeties and lives rest on an estimated treatment of the gears."),
-    "W-MOTION": (DOUBT, "A member moves far enough to change contact points and arms."),
-    "W-NEIGHBOURS": (NOTE, "Neighbouring planets come close to one another."),
-    "W-OIL": (DOUBT, "The viscosity of the oil is extrapolated beyond the temperatures at which its law holds."),
-    "W-ONE-WAY": (NOTE, "Supports or a casing change the level that load factors are computed without."),
-    "W-OPEN": (NOTE, "A planet carries nothing at some positions."),
-    "W-OVERLAP": (DOUBT, "Shafts and gears take up the same space."),
-    "W-PARTED": (NOTE, "Teeth never touch."),
-    "W-PLANETS": (NOTE, "Planets are not equally spaced, or their number is unusual."),
-    "W-PLAY": (DOUBT, "Bearings that carry nothing hold nothing: shafts float in their play."),
-    "W-PLUGIN": (NOTE, "A package has a train of a name that is taken."),
-    "W-POINTS": (DOUBT, "Points on the ring do not resolve its waves."),
-    "W-POSITIONS": (DOUBT, "Peaks between positions may be higher."),
-    "W-PASSES": (DOUBT, "Shafts and teeth have not settled within the passes that are allowed."),
-    "W-PRESSURE": (FAULT, "The contact pressure exceeds what any steel carries."),
-    "W-PROFILE": (NOTE, "A profile has proportions that are unusual."),
-    "W-PULL": (DOUBT, "Meshes pull where real teeth would part."),
-    "W-RATE": (DOUBT, "Steps or samples are too coarse for the frequencies."),
-    "W-RECORD": (NOTE, "A record ends below a frequency that matters."),
-    "W-RELIEF-SIGN": (NOTE, "A modification adds material."),
-    "W-RESIDUAL": (DOUBT, "Static compliance beyond the modes of a casing is missing."),
-    "W-REVERSAL": (NOTE, "Load cases of both directions bend roots both ways, which lowers their strength."),
-    "W-RIGID": (DOUBT, "A response holds bodies rigid that the modes have elastic."),
-    "W-RIM": (NOTE, "A rim is thin; of rated gears a doubt where the rim factor of ISO 6336-3 does not hold."),
-    "W-REXS": (DOUBT, "A REXS file holds what the case that was made of it has not, or has otherwise."),
-    "W-ROWS": (NOTE, "Tables that no sheet can hold are left out."),
-    "W-SEPARATION": (NOTE, "Flanks part at speeds of operation."),
-    "W-SETTLED": (DOUBT, "Motions do not repeat within the periods that are allowed."),
-    "W-SIZE": (NOTE, "The computation takes long, or fills much memory."),
-    "W-SLICES": (NOTE, "Slices make the dynamics slow."),
-    "W-SMOOTHING": (DOUBT, "The smoothing of contact changes the result."),
-    "W-SPECTRUM": (NOTE, "The stage spectrum refuses this case."),
-    "W-SPEED": (NOTE, "Torques change the speed within the record."),
-    "W-STANDING": (DOUBT, "Planets of a carrier that turns vibrate where they stand: lines have no side bands."),
-    "W-STEPS": (DOUBT, "Peaks of resonances are too narrow for the speeds of a run-up."),
-    "W-STIFFNESS": (DOUBT, "Results rest on estimated stiffnesses, of bearings or of meshes."),
-    "W-STRENGTH": (FAULT, "A tooth fails at once: a stress exceeds its static strength."),
-    "W-SWEEP": (NOTE, "A sweep takes long."),
-    "W-TAIL": (DOUBT, "The highest harmonics of a response are not small."),
-    "W-TEETH": (
+    "W-FREE": Meaning(
+        DOUBT,
+        "More modes have no stiffness than a gearbox has ways to turn.",
+        "motions that nothing holds",
+        "Give bearings that carry, and stiffer feet.",
+    ),
+    "W-FRICTION": Meaning(
+        DOUBT,
+        "Friction acts at all speeds with the coefficient of one of them.",
+        "friction of another speed",
+        "Compute speeds that matter as load cases of their own.",
+    ),
+    "W-GROWTH": Meaning(
+        DOUBT,
+        "The free motion grows: a parametric resonance.",
+        "motion that grows",
+        "Give more damping or another speed, or let teeth part.",
+    ),
+    "W-HEAT": Meaning(
+        DOUBT,
+        "Teeth are hotter, or their oil film thinner, than the oil is good for.",
+        "oil beyond its range",
+        "Take another oil, a lower temperature of the oil, or less torque.",
+    ),
+    "W-HELIX": Meaning(
+        DOUBT,
+        "The helix angle lies outside what is validated.",
+        "helix angle not validated",
+        "Read stiffnesses with a margin: docs/validation.md says how far they are checked.",
+    ),
+    "W-JOURNAL": Meaning(
+        NOTE,
+        "Lines of a journal were damaged and are left out.",
+        "damaged lines of a journal",
+        "Nothing: what stood there is computed again.",
+    ),
+    "W-KINK": Meaning(
+        DOUBT,
+        "A stress stands at a kink, or at an end of what was searched.",
+        "stress at a kink",
+        'Write shape = "parabolic" for reliefs, and give the rounding of the tool; the stress beside it holds.',
+    ),
+    "W-LIFE": Meaning(
+        FAULT,
+        "Teeth or bearings fail before the life that the case asks for.",
+        "life too short",
+        "Less torque or time in the load case that is named, a wider face, a larger module or bearing.",
+    ),
+    "W-LIFTED": Meaning(
+        NOTE,
+        "Parts of the face width never carry.",
+        "part of the width lifts",
+        "Look at misalignment and crowning: fewer millimetres carry than the teeth have.",
+    ),
+    "W-LOAD": Meaning(
+        NOTE,
+        "Without load nothing keeps the flanks on one side.",
+        "no load",
+        "Give a torque.",
+    ),
+    "W-LOSSES": Meaning(
+        NOTE,
+        "Losses of a part are left out, or rest on a simpler model.",
+        "losses in part unknown",
+        "Give teeth and lubricant of the stages that the message names.",
+    ),
+    "W-MATERIAL": Meaning(
+        DOUBT,
+        "Safeties and lives rest on an estimated treatment of the gears.",
+        "treatment is estimated",
+        "Give treatment, grade and hardness of the drawing, and leave estimated out.",
+    ),
+    "W-MOTION": Meaning(
+        DOUBT,
+        "A member moves far enough to change contact points and arms.",
+        "a member moves far",
+        "Give stiffer supports, or less torque: contact points are those of the unmoved set.",
+    ),
+    "W-NEIGHBOURS": Meaning(
+        NOTE,
+        "Neighbouring planets come close to one another.",
+        "planets close to one another",
+        "Take fewer planets, or other teeth.",
+    ),
+    "W-OIL": Meaning(
+        DOUBT,
+        "The viscosity of the oil is extrapolated beyond the temperatures at which its law holds.",
+        "oil temperature beyond its law",
+        "Give an oil with viscosities at the temperatures of the contact.",
+    ),
+    "W-ONE-WAY": Meaning(
+        NOTE,
+        "Supports or a casing change the level that load factors are computed without.",
+        "casing not in load factors",
+        "Read K_gamma and mesh forces as those without the casing.",
+    ),
+    "W-OPEN": Meaning(
+        NOTE,
+        "A planet carries nothing at some positions.",
+        "a planet is unloaded at times",
+        "Give more torque, or smaller errors of the pins, if planets are to share the load.",
+    ),
+    "W-OVERLAP": Meaning(
+        DOUBT,
+        "Shafts and gears take up the same space.",
+        "bodies in one place",
+        "Correct axis, start or diameters of what the message names.",
+    ),
+    "W-PARTED": Meaning(
+        NOTE,
+        "Teeth never touch.",
+        "teeth never touch",
+        "Give torques or a start that close the flanks.",
+    ),
+    "W-PLANETS": Meaning(
+        NOTE,
+        "Planets are not equally spaced, or their number is unusual.",
+        "unusual planets",
+        "Nothing, if the drawing has them so: fewer forces cancel than with equal spacing.",
+    ),
+    "W-PLAY": Meaning(
+        DOUBT,
+        "Bearings that carry nothing hold nothing: shafts float in their play.",
+        "a shaft floats in its play",
+        "Give weight, preload or less clearance, or a load that presses the shaft to one side.",
+    ),
+    "W-PLUGIN": Meaning(
+        NOTE,
+        "A package has a train of a name that is taken.",
+        "two trains of one name",
+        "Remove the package, or rename its train.",
+    ),
+    "W-POINTS": Meaning(
+        DOUBT,
+        "Points on the ring do not resolve its waves.",
+        "too few points on the ring",
+        "Raise housing.points as the message says.",
+    ),
+    "W-POSITIONS": Meaning(
+        DOUBT,
+        "Peaks between positions may be higher.",
+        "peaks between positions",
+        "Raise static.positions, or the number that the message names.",
+    ),
+    "W-PASSES": Meaning(
+        DOUBT,
+        "Shafts and teeth have not settled within the passes that are allowed.",
+        "shafts have not settled",
+        "Raise deflection.passes.",
+    ),
+    "W-PRESSURE": Meaning(
+        FAULT,
+        "The contact pressure exceeds what any steel carries.",
+        "pressure beyond any steel",
+        "Less torque, a wider face, or a larger module.",
+    ),
+    "W-PROFILE": Meaning(
+        NOTE,
+        "A profile has proportions that are unusual.",
+        "unusual proportions",
+        "Nothing, if the drawing has them so.",
+    ),
+    "W-PULL": Meaning(
+        DOUBT,
+        "Meshes pull where real teeth would part.",
+        "flanks pull that would part",
+        "Give more torque or damping, or compute with teeth that part.",
+    ),
+    "W-RATE": Meaning(
+        DOUBT,
+        "Steps or samples are too coarse for the frequencies.",
+        "steps too coarse",
+        "Raise the rate that the message names.",
+    ),
+    "W-RECORD": Meaning(
+        NOTE,
+        "A record ends below a frequency that matters.",
+        "record ends low",
+        "Raise transient.record, if higher frequencies matter.",
+    ),
+    "W-RELIEF-SIGN": Meaning(
+        NOTE,
+        "A modification adds material.",
+        "a relief adds material",
+        "Give a positive amount, which takes material off.",
+    ),
+    "W-RESIDUAL": Meaning(
+        DOUBT,
+        "Static compliance beyond the modes of a casing is missing.",
+        "casing without static rest",
+        "Export more modes, residual vectors, or the reduced matrices.",
+    ),
+    "W-REVERSAL": Meaning(
+        NOTE,
+        "Load cases of both directions bend roots both ways, which lowers their strength.",
+        "roots bent both ways",
+        "Give strength.reversal_factor, or leave load cases out that reverse no load.",
+    ),
+    "W-RIGID": Meaning(
+        DOUBT,
+        "A response holds bodies rigid that the modes have elastic.",
+        "bodies held rigid",
+        "Look at the modes of these bodies near the lines that matter.",
+    ),
+    "W-RIM": Meaning(
+        NOTE,
+        "A rim is thin; of rated gears a doubt where the rim factor of ISO 6336-3 does not hold.",
+        "thin rim",
+        "Give a thicker rim: the factor of ISO 6336-3 ends there.",
+    ),
+    "W-REXS": Meaning(
+        DOUBT,
+        "A REXS file holds what the case that was made of it has not, or has otherwise.",
+        "REXS file with other content",
+        "Compare the entries that the message names with their source.",
+    ),
+    "W-ROWS": Meaning(
+        NOTE,
+        "Tables that no sheet can hold are left out.",
+        "tables left out",
+        "Export them with --csv.",
+    ),
+    "W-SEPARATION": Meaning(
+        NOTE,
+        "Flanks part at speeds of operation.",
+        "flanks part",
+        "Give set.backlash, more torque or more damping.",
+    ),
+    "W-SETTLED": Meaning(
+        DOUBT,
+        "Motions do not repeat within the periods that are allowed.",
+        "motions do not repeat",
+        "Allow more periods: the motion may be chaotic.",
+    ),
+    "W-SIZE": Meaning(
+        NOTE,
+        "The computation takes long, or fills much memory.",
+        "long computation",
+        "Take fewer speeds, or a lower dynamics.up_to, if that is too much.",
+    ),
+    "W-SLICES": Meaning(
+        NOTE,
+        "Slices make the dynamics slow.",
+        "slices take time",
+        "Take fewer slices, if that is too long.",
+    ),
+    "W-SMOOTHING": Meaning(
+        DOUBT,
+        "The smoothing of contact changes the result.",
+        "smoothed contact",
+        "Lower planar.smoothing where teeth part or wedge.",
+    ),
+    "W-SPECTRUM": Meaning(
+        NOTE,
+        "The stage spectrum refuses this case.",
+        "no load spectrum",
+        "Give what the message names, or leave the spectrum out.",
+    ),
+    "W-SPEED": Meaning(
+        NOTE,
+        "Torques change the speed within the record.",
+        "speed changes in the record",
+        "share = 1.0 at another load balances the torques.",
+    ),
+    "W-STANDING": Meaning(
+        DOUBT,
+        "Planets of a carrier that turns vibrate where they stand: lines have no side bands.",
+        "planets vibrate where they stand",
+        "Give equal branches on one carrier; else levels hold, and lines have no side bands.",
+    ),
+    "W-STEPS": Meaning(
+        DOUBT,
+        "Peaks of resonances are too narrow for the speeds of a run-up.",
+        "few speeds at resonances",
+        "Raise runup.count, or take a narrower range: levels may be higher.",
+    ),
+    "W-STIFFNESS": Meaning(
+        DOUBT,
+        "Results rest on estimated stiffnesses, of bearings or of meshes.",
+        "estimated stiffness",
+        "Give stiffness or catalogue numbers of bearings, and the contact of teeth.",
+    ),
+    "W-STRENGTH": Meaning(
+        FAULT,
+        "A tooth fails at once: a stress exceeds its static strength.",
+        "a tooth fails at once",
+        "Less torque in that load case, a wider face, a larger module, or another treatment.",
+    ),
+    "W-SWEEP": Meaning(
+        NOTE,
+        "A sweep takes long.",
+        "long sweep",
+        "Nothing: an interrupted sweep goes on where it was.",
+    ),
+    "W-TAIL": Meaning(
+        DOUBT,
+        "The highest harmonics of a response are not small.",
+        "too few harmonics or side bands",
+        "Raise the number that the message names; forces and levels change by what it says.",
+    ),
+    "W-TEETH": Meaning(
         NOTE,
         "Teeth do not suit their radii, shifted planets have no centre distance, or planets do not assemble.",
+        "teeth do not suit",
+        "Correct teeth, radii or number of planets as the message says.",
     ),
-    "W-THRUST": (DOUBT, "Axial forces tilt the planets, which the model holds upright."),
-    "W-TIP": (NOTE, "Tips are shorter than those of the basic rack."),
-    "W-TIP-THIN": (NOTE, "The tooth is thin at its tip."),
-    "W-TORQUE": (NOTE, "The torque has an unusual sign or size."),
-    "W-UNDERCUT": (NOTE, "The tool cuts into the flank at the root."),
-    "W-UNSTABLE": (DOUBT, "A periodic solution is unstable: a real machine leaves it."),
-    "W-UNSTEADY": (DOUBT, "The speed of a recording is another one than is said, or changes: lines are smeared."),
-    "W-UNUSED": (NOTE, "An entry of the case has no effect."),
-    "W-WEDGED": (NOTE, "Meshes are loaded on both flanks at once."),
-    "W-WEDGING": (NOTE, "Teeth have so little play that they may wedge."),
-    "W-WIDTHS": (NOTE, "Gears are wider than their mates; in a gearbox a doubt where they face each other in part."),
+    "W-THRUST": Meaning(
+        DOUBT,
+        "Axial forces tilt the planets, which the model holds upright.",
+        "planets tilt under thrust",
+        "Give the tilt that bearings allow as a lead slope of the planets.",
+    ),
+    "W-TIP": Meaning(
+        NOTE,
+        "Tips are shorter than those of the basic rack.",
+        "shortened tips",
+        "Give tip_diameter where the drawing has another one.",
+    ),
+    "W-TIP-THIN": Meaning(
+        NOTE,
+        "The tooth is thin at its tip.",
+        "thin tips",
+        "Take a smaller profile shift or tip diameter: hardened tips may break off.",
+    ),
+    "W-TORQUE": Meaning(
+        NOTE,
+        "The torque has an unusual sign or size.",
+        "unusual torque",
+        "Nothing, if it is meant so.",
+    ),
+    "W-UNDERCUT": Meaning(
+        NOTE,
+        "The tool cuts into the flank at the root.",
+        "undercut",
+        "Give a larger profile shift or more teeth.",
+    ),
+    "W-UNSTABLE": Meaning(
+        DOUBT,
+        "A periodic solution is unstable: a real machine leaves it.",
+        "unstable motion",
+        "Do not use this speed: give more damping, or compute the motion in time.",
+    ),
+    "W-UNSTEADY": Meaning(
+        DOUBT,
+        "The speed of a recording is another one than is said, or changes: lines are smeared.",
+        "speed of the recording",
+        "Give the speed that the message names, or record pulses.",
+    ),
+    "W-UNUSED": Meaning(
+        NOTE,
+        "An entry of the case has no effect.",
+        "entry without effect",
+        "Leave it out, or give what would make it act.",
+    ),
+    "W-WEDGED": Meaning(
+        NOTE,
+        "Meshes are loaded on both flanks at once.",
+        "loaded on both flanks",
+        "Give more backlash.",
+    ),
+    "W-WEDGING": Meaning(
+        NOTE,
+        "Teeth have so little play that they may wedge.",
+        "little play",
+        "Give more backlash, or smaller errors.",
+    ),
+    "W-WIDTHS": Meaning(
+        NOTE,
+        "Gears are wider than their mates; in a gearbox a doubt where they face each other in part.",
+        "unequal face widths",
+        "Correct face widths or places of the gears.",
+    ),
 }
-"""Severity and meaning of every code, in one sentence; the text of a finding says the numbers."""
+"""What every code means; the text of a finding says the numbers."""
 
 
 @dataclass(frozen=True)
@@ -161,7 +609,7 @@ class Finding:
     stage: str = field(default="", compare=False)
 
     def __post_init__(self) -> None:
-        usual = CATALOGUE[self.code][0] if self.code else NOTE
+        usual = CATALOGUE[self.code].severity if self.code else NOTE
         object.__setattr__(self, "severity", self.severity or usual)
         if self.severity not in SEVERITIES:
             raise ValueError(f"{self.severity!r} is no severity: {', '.join(SEVERITIES)}")
@@ -171,6 +619,11 @@ class Finding:
         where = f"{self.key}: " if self.key else ""
         usual = f" (usual: {self.limit})" if self.limit else ""
         return printable(f"{head}{where}{self.text}{'; ' if self.remedy else ''}{self.remedy}{usual}")
+
+
+def in_words(code: str) -> str:
+    """Write a code behind what it means in few words, such as "flanks part (W-SEPARATION)"."""
+    return f"{CATALOGUE[code].words} ({code})"
 
 
 def remark(text: str) -> Finding:

@@ -42,9 +42,13 @@ def test_every_code_stands_in_the_catalogue_and_is_raised():
 
 @pytest.mark.parametrize("code", CATALOGUE)
 def test_meanings_are_sentences_and_severities_known(code):
-    severity, meaning = CATALOGUE[code]
-    assert severity in SEVERITIES
-    assert meaning[0].isupper() and meaning.endswith(".")
+    meaning = CATALOGUE[code]
+    assert meaning.severity in SEVERITIES
+    for sentence in (meaning.sentence, meaning.advice):
+        assert sentence[0].isupper() or sentence.startswith(("femgear ", "share = "))
+        assert sentence.endswith(".") and max(len(part.split()) for part in re.split(r"[.:;] ", sentence)) <= 25
+    # beside a number on a card
+    assert 2 <= len(meaning.words) <= 40 and not meaning.words.endswith(".") and code not in meaning.words
 
 
 def test_a_finding_has_the_severity_of_its_code_unless_given():

@@ -78,7 +78,11 @@ def run(tmp_path_factory):
     (package / "entry_points.txt").write_text("[femgear.trains]\noscillator = changed_oscillator\n", "utf-8")
     with pytest.MonkeyPatch.context() as patch:
         patch.syspath_prepend(str(place))
-        patch.setitem(findings.CATALOGUE, "W-SLOW", (findings.DOUBT, "The mass swings slowly."))
+        patch.setitem(
+            findings.CATALOGUE,
+            "W-SLOW",
+            findings.Meaning(findings.DOUBT, "The mass swings slowly.", "it swings slowly", "Make it lighter."),
+        )
         registry._installed.cache_clear()
         with redirect_stdout(out), redirect_stderr(err):
             assert cli.main(["run", str(place / "case.toml"), "-o", str(place / "out")]) == 0
@@ -103,7 +107,7 @@ def test_a_finding_is_raised_and_has_one_line_of_the_catalogue(run, capsys):
     assert [finding["code"] for finding in manifest["findings"]] == ["W-SLOW"]
     assert "W-SLOW" in open_results(folder).modes.attrs["findings"]
     assert "doubt of modes: [W-SLOW]" in (folder / "report.html").read_text(encoding="utf-8")
-    assert cli.main(["explain", "W-SLOW"]) == 0 and "The mass swings slowly." in capsys.readouterr().out
+    assert cli.main(["explain", "W-SLOW"]) == 0 and "Make it lighter." in capsys.readouterr().out
 
 
 def test_a_question_of_page_one_is_one_judgement(run, capsys):

@@ -30,9 +30,11 @@ def explain(code: str, /) -> int:
     }
     name = code.strip().strip("[]").upper()
     if name in CATALOGUE:
-        severity, meaning = CATALOGUE[name]
-        say(f"{name}: {meaning}")
-        say(f"A warning, which ends nothing. Severity: {severity}, {severities[severity]}.")
+        meaning = CATALOGUE[name]
+        say(f"{name}, {meaning.words}: {meaning.sentence}")
+        say(f"A warning, which ends nothing. Severity: {meaning.severity}, {severities[meaning.severity]}.")
+        say(f"What to do: {meaning.advice}")
+        say("The warning itself has numbers, and the entry of the case file where one draws it.")
     elif name in CODES:
         say(f"{name}: {CODES[name]}")
         say("A refusal: nothing was computed. Its message has entry, value, limit and remedy.")

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from femgear.findings import CATALOGUE, NOTE, Finding, by_severity, findings_in
+from femgear.findings import CATALOGUE, NOTE, Finding, by_severity, findings_in, in_words
 from femgear.report.response import some_at_a_time, stored_harmonics
 from femgear.report.style import NOTICEABLE
 from femgear.system.fourier import fluctuation, sample
@@ -104,7 +104,7 @@ def listed(findings: Iterable[Finding]) -> tuple[Block, ...]:
     columns = {
         "": lambda finding: f"{finding.severity} {finding.code}".strip(),
         "of": lambda finding: finding.stage or "the case",
-        "meaning": lambda finding: CATALOGUE[finding.code][1] if finding.code else finding.text,
+        "meaning": lambda finding: CATALOGUE[finding.code].sentence if finding.code else finding.text,
     }
     block = tabulate(WARNINGS, by_severity(findings), columns)
     return (replace(block, rows=tuple(dict.fromkeys(block.rows))),) if block.rows else ()
@@ -151,14 +151,14 @@ class Marks:
 
     @property
     def codes(self) -> tuple[str, ...]:
-        """The marks that were used with their codes, where there is no room for `notes`."""
-        return tuple(f"{mark} {code}" for code, mark in self._marks.items() if code in self._used)
+        """The marks that were used with words and codes, where there is no room for `notes`."""
+        return tuple(f"{mark} {in_words(code)}" for code, mark in self._marks.items() if code in self._used)
 
     @property
     def notes(self) -> tuple[str, ...]:
         """What the marks that were used mean."""
         return tuple(
-            f"{mark} {code}, {self._known[code][0].severity}: {CATALOGUE[code][1]}"
+            f"{mark} {code}, {self._known[code][0].severity}: {CATALOGUE[code].sentence}"
             for code, mark in self._marks.items()
             if code in self._used
         )

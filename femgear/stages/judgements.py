@@ -14,7 +14,7 @@ from typing import Any, Literal
 import numpy as np
 
 from femgear.case.sections import StrengthSection
-from femgear.findings import CATALOGUE, DOUBT, FAULT, NOTE, Finding
+from femgear.findings import CATALOGUE, DOUBT, FAULT, NOTE, Finding, in_words
 from femgear.report.tables import Block, merged_names
 from femgear.stages.life_results import SYMBOLS, first_to_fail, hours_text
 from femgear.stages.strength import OF_ROOTS, RatedFlank, Rating, gear_words
@@ -34,6 +34,8 @@ STRONG, LIFE, HEAT, SMOOTH, QUIET, SURE = (
 
 _RAISED = 0.5
 """Change of a level by a longer excitation from which on the higher one is compared with the limit too [dB]."""
+MOST_DOUBTS = 3
+"""Doubts that the card of the numbers names."""
 _BEYOND = "W-PRESSURE", "W-STRENGTH"
 """Codes of the findings that no steel carries the load."""
 
@@ -169,19 +171,14 @@ def _raised(findings: Iterable[Finding], codes: Sequence[str]) -> list[str]:
     return [code for code in dict.fromkeys(codes) if code in raised]
 
 
-def _meaning(code: str) -> str:
-    """Write a code with what it means."""
-    return f"{code}: {CATALOGUE[code][1].rstrip('.')}"
-
-
 def _doubts(findings: Iterable[Finding], codes: Sequence[str]) -> str:
     """Name the doubts and faults with some codes; empty of none."""
-    return doubt_words(_raised(findings, codes))
+    return doubt_words([in_words(code) for code in _raised(findings, codes)])
 
 
-def doubt_words(codes: Sequence[str]) -> str:
-    """Name doubts by their codes, with marks where these have some; empty of none."""
-    return f"doubt{'s' * (len(codes) > 1)}: {', '.join(codes)}" if codes else ""
+def doubt_words(doubts: Sequence[str]) -> str:
+    """List doubts in words, with marks where these have some; empty of none."""
+    return f"doubt{'s' * (len(doubts) > 1)}: {', '.join(doubts)}" if doubts else ""
 
 
 def stresses_text(root: np.ndarray, pressure: np.ndarray) -> str:
@@ -233,8 +230,8 @@ def judge_strength(
     ]
     if beyond:
         answer = ", ".join(f"{symbol} {least.value:.2f} ({least.where})" for symbol, least, _ in rated) or stresses
-        meanings = "; ".join(map(_meaning, beyond))
-        return Judgement(STRONG, "bad", answer, meanings, f"Not strong enough ({', '.join(beyond)})")
+        words = ", ".join(CATALOGUE[code].words for code in beyond)
+        return Judgement(STRONG, "bad", answer, "; ".join(map(in_words, beyond)), f"Not strong enough: {words}")
     if not rated:
         return Judgement(STRONG, "open", stresses or "not rated", remedy, "Its strength is not rated")
     low = [(symbol, least, required) for symbol, least, required in rated if not least.value >= required]
@@ -369,7 +366,7 @@ def judge_heat(results: Any) -> Iterator[Judgement]:
 def judge_smoothness(answer: str, results: Any, stages: Sequence[str]) -> Judgement:
     """Judge the run by what speaks against it: teeth that part or press on both flanks, motions that are not stable.
 
-    So do planets that carry nothing at some positions, and mesh forces that are cut short.
+    So do planets that carry nothing at some positions, and mesh forces of which too few harmonics were taken.
 
     Parameters
     ----------
@@ -384,7 +381,7 @@ def judge_smoothness(answer: str, results: Any, stages: Sequence[str]) -> Judgem
         return Judgement(SMOOTH, "open", answer or "not known", "no motion was computed")
     against = list(dict.fromkeys(_against(results, present)))
     if not against and any(finding.code == "W-TAIL" and finding.severity == DOUBT for finding in results.findings):
-        return _smoothness("look", answer, "mesh forces are cut short")
+        return _smoothness("look", answer, _FEW_HARMONICS)
     if not against and any(finding.code == "W-OPEN" for finding in results.findings):
         return _smoothness("look", answer, "a planet carries nothing at some positions")
     if not against:
@@ -413,6 +410,8 @@ def _against(results: Any, stages: Sequence[str]) -> Iterator[str]:
         yield "motions are not stable"
 
 
+_FEW_HARMONICS = "mesh forces may change: too few harmonics or side bands were taken (W-TAIL)"
+"""Of a run whose forces a longer excitation would change."""
 _CLEAR = "no resonance makes the level at a speed of operation"
 MAKES_LEVEL = 0.5
 """Share of the level from which on one resonance makes it."""
@@ -532,15 +531,15 @@ def judge_numbers(findings: Sequence[Finding], complete: bool) -> Judgement:
     Faults are of the gears, not of numbers, but those whose code is else a doubt: numbers far beyond their model.
     """
     doubts = [finding for finding in findings if finding.severity == DOUBT]
-    beyond = [f for f in findings if f.severity == FAULT and CATALOGUE.get(f.code, ("",))[0] == DOUBT]
+    beyond = [f for f in findings if f.severity == FAULT and f.code and CATALOGUE[f.code].severity == DOUBT]
     if not complete:
         return Judgement(SURE, "bad", "the run did not come to its end", "", "The run did not come to its end")
     if beyond:
-        words = ", ".join(_meaning(code) for code in dict.fromkeys(finding.code for finding in beyond))
+        words = ", ".join(map(in_words, dict.fromkeys(finding.code for finding in beyond)))
         return Judgement(SURE, "bad", "numbers are far beyond their model", words, f"Numbers hold nothing: {words}")
     if doubts:
         codes = list(dict.fromkeys(finding.code for finding in doubts if finding.code))
-        shown = ", ".join([*map(_meaning, codes[:1]), *codes[1:4]])
-        shown += f" and {len(codes) - 4} more" if len(codes) > 4 else ""
+        shown = ", ".join(map(in_words, codes[:MOST_DOUBTS]))
+        shown += f" and {len(codes) - MOST_DOUBTS} more" if len(codes) > MOST_DOUBTS else ""
         return Judgement(SURE, "look", f"{len(doubts)} doubt{'s' * (len(doubts) > 1)}", shown)
     return Judgement(SURE, "good", "no doubt was raised", "solutions converged, samples resolve them")

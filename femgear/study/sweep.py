@@ -160,7 +160,7 @@ def _tell_of_doubts(swept: Sweep) -> None:
         cases = len(set.union(*quantities.values()))
         text = (
             f"{cases} of {len(swept.points)} cases (column findings), {' and '.join(quantities)}: "
-            f"{CATALOGUE[code][1][:1].lower()}{CATALOGUE[code][1][1:].rstrip('.')}"
+            f"{CATALOGUE[code].sentence[:1].lower()}{CATALOGUE[code].sentence[1:].rstrip('.')}"
         )
         tell(Finding(code, "", text, remedy="femgear run of such a case says more"), stacklevel=3)
 

@@ -10,12 +10,17 @@ from femgear import cli
 
 @pytest.mark.parametrize(
     ("code", "words"),
-    (("W-PULL", "Severity: doubt"), ("[e-mass]", "A refusal"), ("W-LIFE", "Severity: fault")),
+    (
+        ("W-PULL", "Severity: doubt"),
+        ("W-TAIL", "What to do: Raise the number"),
+        ("[e-mass]", "A refusal"),
+        ("W-LIFE", "Severity: fault"),
+    ),
 )
 def test_a_code_is_explained(capsys, code, words):
     assert cli.main(["explain", code]) == 0
     printed = capsys.readouterr().out
-    assert printed.startswith(code.strip("[]").upper() + ": ") and words in printed
+    assert printed.startswith(code.strip("[]").upper()) and words in printed
 
 
 def test_a_code_that_is_none_is_refused_with_those_that_are_near(capsys):

@@ -11,7 +11,7 @@ def test_a_doubtful_number_is_marked_where_it_stands_and_a_note_is_not():
     columns = {"p": lambda p: marks(p, "W-PRESSURE", "W-OPEN"), "k": lambda p: marks(p, "W-DEFLECTION")}
     block = tabulate("Static", ["4573.4", "-"], columns, ("said before",), marks)
     assert block.rows == (("4573.4†", "4573.4"), ("-", "-"))
-    assert block.notes == ("said before", f"† W-PRESSURE, fault: {CATALOGUE['W-PRESSURE'][1]}")
+    assert block.notes == ("said before", f"† W-PRESSURE, fault: {CATALOGUE['W-PRESSURE'].sentence}")
     assert float(unmarked(block.rows[0][0])) == 4573.4
 
 
@@ -26,7 +26,10 @@ def test_every_finding_of_a_table_has_a_mark_of_its_own():
 def test_a_mark_stands_for_the_same_in_all_texts_of_the_same_findings():
     findings = [Finding(code, "", "text", severity="doubt") for code in ("W-FACE-LOAD", "W-TAIL", "W-CROSS")]
     sentence, table = Marks(findings), Marks(findings)
-    assert sentence("4.2", "W-CROSS", "W-TAIL") == "4.2‡§" and sentence.codes == ("‡ W-TAIL", "§ W-CROSS")
+    assert sentence("4.2", "W-CROSS", "W-TAIL") == "4.2‡§" and sentence.codes == (
+        "‡ too few harmonics or side bands (W-TAIL)",
+        "§ stages shake one another (W-CROSS)",
+    )
     assert [table("1", finding.code) for finding in findings] == ["1†", "1‡", "1§"]
     assert [note[0] for note in table.notes] == ["†", "‡", "§"]
 

@@ -55,7 +55,7 @@ def test_strength_without_limits_is_open_and_half_of_it_deserves_a_look():
     assert half.state == "look" and half.limit.endswith("S_F is not rated")
     doubt = Finding("W-FACE-LOAD", "", "text", severity=DOUBT)
     doubtful = judge_strength(ROOT, FLANK, StrengthSection(), "", [doubt], ["W-FACE-LOAD"])
-    assert doubtful.state == "look" and doubtful.limit.endswith("; doubt: W-FACE-LOAD")
+    assert doubtful.state == "look" and doubtful.limit.endswith("; doubt: load over the width is coarse (W-FACE-LOAD)")
     assert judge_strength(ROOT, FLANK, StrengthSection(), "", [doubt], ["W-THRUST"]).state == "good"
 
 
@@ -83,7 +83,7 @@ def test_what_no_steel_carries_fails_whatever_its_safeties():
     unrated = judge_strength(None, None, StrengthSection(), "root 900 MPa", [fault])
     assert (unrated.state, unrated.answer) == ("bad", "root 900 MPa")
     # the code with its meaning
-    assert unrated.limit.startswith("W-PRESSURE: The contact pressure")
+    assert unrated.limit == "pressure beyond any steel (W-PRESSURE)"
 
 
 def test_the_safety_over_the_life_counts_where_it_is_smaller():
@@ -135,7 +135,11 @@ def test_lives_deserve_a_look_where_some_are_unknown_or_doubtful():
     assert part.sentence.endswith("; the life of stage 1..2 is not known")
     doubt = Finding("W-STIFFNESS", "", "text")
     (doubtful,) = judge_lives(lives, 100.0, [doubt, Finding("W-TAIL", "", "of a response")])
-    assert doubtful.state == "look" and "doubt: W-STIFFNESS" in doubtful.limit and "W-TAIL" not in doubtful.limit
+    assert (
+        doubtful.state == "look"
+        and "doubt: estimated stiffness (W-STIFFNESS)" in doubtful.limit
+        and "W-TAIL" not in doubtful.limit
+    )
     assert [judgement.state for judgement in judge_lives(lives, 500.0, [doubt])] == ["bad"]
     names = xr.Dataset(coords={"root": ["gear 1", "planet, sun side"], "flank": ["planet, sun side", "gear 1, back"]})
     assert without_life(names, ["gear_1", "planet", "ring"]) == ["the ring"]
@@ -197,7 +201,10 @@ def test_a_run_is_smooth_unless_teeth_part_or_motions_grow():
     assert judge_smoothness("", pulled, ("dynamics",)).answer == "teeth part"
     pulled.findings = (Finding("W-TAIL", "", "it ends short", severity=DOUBT),)
     short = judge_smoothness("", pulled, ("dynamics",))
-    assert (short.state, short.answer) == ("look", "mesh forces are cut short")
+    assert (short.state, short.answer) == (
+        "look",
+        "mesh forces may change: too few harmonics or side bands were taken (W-TAIL)",
+    )
     pulled.findings = (Finding("W-OPEN", "", "planet 2 carries nothing"),)
     unloaded = judge_smoothness("", pulled, ("dynamics",))
     assert (unloaded.state, unloaded.answer) == ("look", "a planet carries nothing at some positions")
@@ -249,7 +256,7 @@ def test_numbers_are_judged_by_the_findings():
     assert (judged.state, judged.answer, judged.limit) == (
         "look",
         "2 doubts",
-        "W-TAIL: The highest harmonics of a response are not small",
+        "too few harmonics or side bands (W-TAIL)",
     )
     # gears that fail say nothing against their numbers
     assert judge_numbers([fault], complete=True).state == "good"

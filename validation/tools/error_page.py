@@ -40,8 +40,8 @@ and in the results (`open_results(OUT).findings`); `femgear check` tells those t
 ends no run: the exit code stays 0. Severities: `note`, worth knowing; `doubt`, a number may be wrong;
 `fault`, nothing real carries that. Those below are the usual ones; a finding may have another.
 
-| code | severity | meaning |
-|---|---|---|
+| code | severity | meaning | what to do where it names nothing else |
+|---|---|---|---|
 {meanings}
 
 | code | entry | message | remedy |
@@ -195,7 +195,10 @@ def page(meanings: dict[str, str]) -> str:
             table = "\n".join(f"| {row} |" for row in cells)
             parts.append(f"| message | allowed | remedy |\n|---|---|---|\n{table}\n")
     rows = "\n".join(f"| {' | '.join(map(_cell, row))} |" for row in warnings())
-    known = "\n".join(f"| {code} | {severity} | {_cell(text)} |" for code, (severity, text) in CATALOGUE.items())
+    known = "\n".join(
+        f"| {code} | {meaning.severity} | {_cell(meaning.sentence)} | {_cell(meaning.advice)} |"
+        for code, meaning in CATALOGUE.items()
+    )
     return "\n".join([*parts, f"{WARNINGS.format(meanings=known)}\n{rows}\n"])
 
 

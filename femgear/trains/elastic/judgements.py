@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from femgear.case.level_limits import limit_at
+from femgear.findings import in_words
 from femgear.report.tables import Marks, is_bound, level_change_at
 from femgear.stages.assumptions import most_decisive
 from femgear.stages.judgements import (
@@ -44,7 +45,9 @@ def _noise(results: Any) -> Judgement:
     at = int(level.argmax())
     speed = float(speeds[at])
     at_microphone = (
-        f" ({float(housing['pressure_level'][at]):.1f} dB(A) at the microphone)" if "pressure_level" in housing else ""
+        f" ({float(housing['pressure_level'][at]):.1f} dB(A) re 20 µPa at the microphone)"
+        if "pressure_level" in housing
+        else ""
     )
     marks = Marks(results.findings)
     size_words = f"{marked_level(results, at, marks, level_doubts(results, [at]).get(at, ()))} m/s²{at_microphone}"
@@ -72,8 +75,8 @@ def _noise(results: Any) -> Judgement:
         line_words += f" at {hertz:,.0f} Hz"
         resonance = resonance_of_line(line_words, hertz, results.modes["frequency"].values, share)
     # a bound has no mark: it is one itself
-    codes = [*(["W-EXCITATION"] if any(map(is_bound, levels)) else []), *marks.codes]
-    return judge_noise(answer, sentence, resonance, margins=margins, doubts=doubt_words(codes))
+    doubts = [*([in_words("W-EXCITATION")] if any(map(is_bound, levels)) else []), *marks.codes]
+    return judge_noise(answer, sentence, resonance, margins=margins, doubts=doubt_words(doubts))
 
 
 def _margins(results: Any) -> Iterator[LevelMargin]:

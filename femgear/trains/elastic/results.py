@@ -129,7 +129,7 @@ _PARTS = ("sun", "planet, sun side", "planet, ring side", "ring")
 _FORMS = ("sun", "planet_sun_side", "planet_ring_side", "ring")
 _OF_LEVEL = "dynamics", "housing"
 """Stages whose findings concern what is heard at operating speeds."""
-_HEARD = {"microphone [dB(A)]": "pressure_level", "sound power [dB(A)]": "power_level"}
+_HEARD = {"microphone [dB(A) re 20 µPa]": "pressure_level", "sound power [dB(A) re 1 pW]": "power_level"}
 BEARING_FACTORS = 0.5, 2.0
 """Multiples of the bearing stiffness of planets between which load sharing is shown."""
 _RING_ALONE = "of the ring alone: a casing of 2 to 3.5 times its width that moves as it does radiates 6 to 11 dB more"
@@ -924,7 +924,11 @@ def describe_housing(
         "excited up to [kHz]": lambda i: f"{float(data.excitation_limit[i]) / 1e3:.2f}",
         "rms [m/s^2]": lambda i: level(data.level, i),
         **({"one way [m/s^2]": one_way} if both else {}),
-        **({"microphone [dB(A)]": lambda i: marked(f"{float(data.pressure_level[i]):.1f}", i)} if audible else {}),
+        **(
+            {"microphone [dB(A) re 20 µPa]": lambda i: marked(f"{float(data.pressure_level[i]):.1f}", i)}
+            if audible
+            else {}
+        ),
         "largest lines: carrier order (amplitude [m/s^2])": lambda i: marked(
             _largest_lines(data.isel(speed=i)), i, "W-POINTS"
         ),

@@ -217,4 +217,4 @@ def _level(level: float) -> str:
     """Write a level with its decibels re 1 µm/s²."""
     if not level > 0.0:
         return "silence"
-    return f"{level:.3g} m/s² ({20.0 * math.log10(level / REFERENCE_ACCELERATION):.0f} dB)"
+    return f"{level:.3g} m/s² ({20.0 * math.log10(level / REFERENCE_ACCELERATION):.0f} dB re 1 µm/s²)"

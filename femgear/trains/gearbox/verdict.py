@@ -110,10 +110,10 @@ def _nearest_mode(data: Any) -> Iterator[tuple[str, str]]:
 
 
 def level_text(level: float) -> str:
-    """Write a level with its decibels re 1 um/s^2."""
+    """Write a level with its decibels re 1 µm/s²."""
     if not level > 0.0:
         return "silent"
-    return f"{level:.4g} m/s^2 ({20.0 * math.log10(level / REFERENCE_ACCELERATION):.1f} dB)"
+    return f"{level:.4g} m/s² ({20.0 * math.log10(level / REFERENCE_ACCELERATION):.1f} dB re 1 µm/s²)"
 
 
 def _level_codes(data: Any, speed: int, sensor: int) -> tuple[str, ...]:

@@ -90,12 +90,12 @@ def test_levels_that_a_longer_excitation_raises_are_bounds_and_do_not_hold_their
     results.dynamics["level_change"].values[0] = 2.0
     noise = judged(results)
     assert noise.state == "look" and noise.limit.endswith(
-        "below the limit at the sensor, 4,000 rpm; doubt: W-EXCITATION"
+        "below the limit at the sensor, 4,000 rpm; doubt: excitation falls short (W-EXCITATION)"
     )
     results.dynamics["level_change"].values[0] = -2.0
     noise = judged(results)
     assert noise.state == "look" and noise.answer == "3.162† m/s² at 3,000 rpm"
-    assert noise.limit.endswith("doubt: † W-EXCITATION")
+    assert noise.limit.endswith("doubt: † excitation falls short (W-EXCITATION)")
 
 
 def test_a_resonance_that_makes_the_level_deserves_a_look(results):

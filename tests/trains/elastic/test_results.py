@@ -20,7 +20,7 @@ from femgear.trains.elastic.results import (
 
 def test_the_table_of_the_housing_has_both_sensors():
     block = describe_housing(synthetic.housing())
-    column = block.header.index("microphone [dB(A)]")
+    column = block.header.index("microphone [dB(A) re 20 µPa]")
     assert [row[column] for row in block.rows] == ["50.9", "87.7"]
     assert "1 m from the ring" in block.notes[-1] and "over its face width" in block.notes[-1]
 

@@ -239,7 +239,7 @@ def test_the_verdict_states_factors_stresses_and_what_they_assume(case, files, f
     assert single > 1.002
     assert f"sun-planet {1500e6 / (single * contact * np.sqrt(sun)):.2f}" in told["safety S_H, ISO 6336-2:2019"]
     assert points.rows[1][3] == f"{float(files['housing']['level'][1]):.4g}"
-    heard = points.header.index("microphone [dB(A)]"), points.header.index("sound power [dB(A)]")
+    heard = points.header.index("microphone [dB(A) re 20 µPa]"), points.header.index("sound power [dB(A) re 1 pW]")
     for column, name in zip(heard, ("pressure_level", "power_level")):
         assert points.rows[1][column] == f"{float(files['housing'][name][1]):.1f}"
     assert "1e+10 N/m³ radial" in points.notes[0] and "damping ratio 0.05" in points.notes[0]
@@ -436,7 +436,7 @@ def test_doubts_of_the_response_are_marked_at_their_speeds(case, files, code, ch
     assert marked == ([True, True] if stage == "" else [False, True])
     factor = dict(first.rows)["largest dynamic factor K_v, at operating speeds"]
     assert ("†" in factor) == (code != "W-POINTS") == ("†" in points.rows[1][1] + points.rows[1][2])
-    heard = points.header.index("microphone [dB(A)]")
+    heard = points.header.index("microphone [dB(A) re 20 µPa]")
     assert ("†" in points.rows[1][heard]) == (code != "W-POINTS")
     if code != "W-POINTS":
         dte = describe_response(dynamics)

@@ -49,4 +49,4 @@ def test_doubtful_numbers_are_marked(results):
 
 
 def test_decibels_are_those_of_iso_1683():
-    assert level_text(1.0) == "1 m/s^2 (120.0 dB)" and level_text(0.0) == "silent"
+    assert level_text(1.0) == "1 m/s² (120.0 dB re 1 µm/s²)" and level_text(0.0) == "silent"
