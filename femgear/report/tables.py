@@ -123,13 +123,16 @@ class Marks:
     ----------
     findings : iterable of Finding
         Of the stages that the numbers come from, and of the case.
+    run : iterable of Finding
+        Of the whole run, in whose order the marks are, so that those of all its tables are the same.
     """
 
-    def __init__(self, findings: Iterable[Finding]) -> None:
-        self._known = dict[str, list[Finding]]()
-        for finding in findings:
-            if finding.severity != NOTE:
-                self._known.setdefault(finding.code, []).append(finding)
+    def __init__(self, findings: Iterable[Finding], run: Iterable[Finding] = ()) -> None:
+        severe = [finding for finding in findings if finding.severity != NOTE]
+        of_run = [finding.code for finding in run if finding.severity != NOTE]
+        self._known = dict[str, list[Finding]]((code, []) for code in (*of_run, *(each.code for each in severe)))
+        for finding in severe:
+            self._known[finding.code].append(finding)
         self._marks = {code: MARKS[n % len(MARKS)] * (n // len(MARKS) + 1) for n, code in enumerate(self._known)}
         self._used = set[str]()
 
@@ -249,13 +252,14 @@ def _nodal_diameters(mode: xr.Dataset) -> str:
     return "-" if mode.nodal_diameter < 0 else str(int(mode.nodal_diameter))
 
 
-def describe_response(data: xr.Dataset) -> Block:
+def describe_response(data: xr.Dataset, run: Iterable[Finding] = ()) -> Block:
     """Tabulate transmission error [um], convergence and stability at the speeds [rpm] of dynamics.nc.
 
     The file has ``dte_real`` and ``dte_imag`` (speed, mesh, harmonic) [m] and, for every speed, what
-    `femgear.storage.results.response_variables` lists; of many speeds the first and the last are shown.
+    `femgear.storage.results.response_variables` lists; of many speeds the first and the last are shown. The findings
+    of the whole ``run`` give the order of the marks.
     """
-    largest, marks = np.abs(data.floquet_multiplier.values), Marks(findings_in(data.attrs))
+    largest, marks = np.abs(data.floquet_multiplier.values), Marks(findings_in(data.attrs), run)
 
     def dte(i: int) -> str:
         of_speed = data.isel(speed=i)

@@ -744,7 +744,7 @@ STATIC = Stage(
     options=("cache", "progress", "steps"),
     decided_by=solution_entries,
     verdict=lambda result: {"contact": result.cycle.contact},
-    describe=lambda results: describe_static(results.static),
+    describe=lambda results: describe_static(results.static, results.findings),
     warnings=StaticResult.warnings,
     check=lambda case: check_slices(case, planetary_set(case)),
 )

@@ -970,10 +970,13 @@ def mean_over_period(data: xr.Dataset, name: str) -> np.ndarray:
     return data[name].values.mean(axis=-1) if stored is None else stored.values
 
 
-def describe_static(data: xr.Dataset) -> Block:
-    """Tabulate transmission errors, stiffnesses and load sharing of static.nc."""
+def describe_static(data: xr.Dataset, run: Iterable[Finding] = ()) -> Block:
+    """Tabulate transmission errors, stiffnesses and load sharing of static.nc.
+
+    The findings of the whole ``run`` give the order of the marks.
+    """
     lowest, highest = (data.get(f"{end}_load_share", data.load_share) for end in ("smallest", "largest"))
-    marks = Marks(findings_in(data.attrs))
+    marks = Marks(findings_in(data.attrs), run)
 
     def error(row: xr.Dataset, value: float) -> str:
         """Write a transmission error, marked where the mesh of a loaded set carries nothing at times."""
@@ -1048,14 +1051,15 @@ def shares(data: xr.Dataset) -> tuple[float, float, str]:
     return float(most), float(share.mean("position").max()), held
 
 
-def describe_stress(data: xr.Dataset, findings: Iterable[Finding] = ()) -> Block:
+def describe_stress(data: xr.Dataset, findings: Iterable[Finding] = (), run: Iterable[Finding] = ()) -> Block:
     """Tabulate the largest stresses of stress.nc beside the nominal ones, with place and range.
 
     One row for the contact and one for the root of every kind of gear, each of its worst mesh. Marked are
-    those that doubts of the file, and ``findings`` of the run, concern.
+    those that doubts of the file, and ``findings`` of the run, concern; all findings of the ``run`` give the order of
+    the marks.
     """
     findings = (*findings, *findings_in(data.attrs))
-    marks = Marks(findings)
+    marks = Marks(findings, run)
     names = [str(name) for name in data["mesh"].values]
     contact, roots = [], []
     for kind in dict.fromkeys(map(family, names)):

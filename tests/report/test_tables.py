@@ -34,6 +34,14 @@ def test_a_mark_stands_for_the_same_in_all_texts_of_the_same_findings():
     assert [note[0] for note in table.notes] == ["†", "‡", "§"]
 
 
+def test_a_table_of_a_stage_has_the_marks_of_its_run():
+    run = [Finding(code, "", "text", severity="doubt") for code in ("W-FACE-LOAD", "W-TAIL", "W-CROSS")]
+    stage = Marks([run[2], Finding("W-OPEN", "", "a note")], run)
+    assert stage("1", "W-TAIL", "W-CROSS") == "1§" and [note[0] for note in stage.notes] == ["§"]
+    # raised by another stage alone
+    assert not stage.raised("W-TAIL") and stage.raised("W-CROSS")
+
+
 @pytest.mark.parametrize(
     ("value", "text"),
     [

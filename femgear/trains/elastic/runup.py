@@ -317,10 +317,14 @@ def largest_factors(data: xr.Dataset, marks: Marks) -> str:
     return ", ".join(texts)
 
 
-def describe_runup(data: xr.Dataset) -> Block:
-    """Tabulate the strongest resonances of runup.nc by speed."""
+def describe_runup(data: xr.Dataset, run: Iterable[Finding] = ()) -> Block:
+    """Tabulate the strongest resonances of runup.nc by speed.
+
+    The findings of the whole ``run`` give the order of the marks.
+    """
     speed = data["speed"].values
-    strongest, marks = np.argsort(-data["resonance_alone"].values, kind="stable")[:_SHOWN], _marks(data)
+    strongest = np.argsort(-data["resonance_alone"].values, kind="stable")[:_SHOWN]
+    marks = Marks(findings_in(data.attrs), run)
     change = level_change_at(data, data["resonance_speed"].values)
     codes = "W-STEPS", *_RUN_UP_DOUBTS
     value = {str(name): variable.values for name, variable in data.items() if variable.dims[:1] == ("resonance",)}
@@ -344,11 +348,6 @@ def describe_runup(data: xr.Dataset) -> Block:
     if data.attrs.get("method", "exact") != "exact":
         notes.append("levels and K_v in the housing that stands still; modes, and alone, on the foundation")
     return tabulate("Run-up", sorted(strongest), columns, notes, marks)
-
-
-def _marks(data: xr.Dataset) -> Marks:
-    """Marks for the findings of runup.nc."""
-    return Marks(findings_in(data.attrs))
 
 
 def runup_warnings(data: xr.Dataset) -> Iterator[Finding]:

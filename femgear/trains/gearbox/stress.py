@@ -214,7 +214,7 @@ def describe_box_stress(data: xr.Dataset, findings: Sequence[Finding] = ()) -> I
             for finding in findings
             if finding.concerns.startswith(f"{name} ")
         ]
-        block = describe_stress(part, of_stage)
+        block = describe_stress(part, of_stage, findings)
         yield replace(block, title=f"Stresses, {name}") if len(parts) > 1 else block
 
 

@@ -175,7 +175,7 @@ def _describe_case(case: PairCase) -> tuple[Block, ...]:
 def _describe_static(results: Results) -> Block:
     """Tabulate static.nc, with the stiffness per face width beside that of the standard."""
     case, data = results.case, results.static
-    block = describe_static(data)
+    block = describe_static(data, results.findings)
     single, mean = (1e-9 * value for value in iso_stiffness(case))
     per_width = 1e-9 * float(mean_over_period(data, "mesh_stiffness").mean()) / data.attrs["face_width"]
     words = f"mean k over face width {per_width:.3f} N/(mm um); ISO 6336-1, method B: "

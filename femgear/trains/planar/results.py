@@ -396,10 +396,13 @@ def _sense(case: PlanarCase) -> str:
     return f"the torque on the carrier acts {'with' if driven else 'against'} its turning"
 
 
-def describe_branch(data: xr.Dataset) -> Block:
-    """Tabulate branch.nc: ends, folds and the largest responses [um], by frequency of the weight [Hz]."""
+def describe_branch(data: xr.Dataset, run: Iterable[Finding] = ()) -> Block:
+    """Tabulate branch.nc: ends, folds and the largest responses [um], by frequency of the weight [Hz].
+
+    The findings of the whole ``run`` give the order of the marks.
+    """
     hertz, rms = data["weight_frequency"].values, data["rms"].values
-    judged, marks = data.attrs["stability"] != "not computed", Marks(findings_in(data.attrs))
+    judged, marks = data.attrs["stability"] != "not computed", Marks(findings_in(data.attrs), run)
     doubtful = _tail_codes(data)
     stable = data["stable"].values
     named = {0: "start", len(hertz) - 1: "end"}
@@ -500,10 +503,13 @@ def _verdicts(data: xr.Dataset) -> Iterator[str]:
         yield f"not stable: {span} ({reasons})" if state == 0 else f"not determined: {span} ({reasons})"
 
 
-def describe_planar_response(data: xr.Dataset) -> Block:
-    """Tabulate displacements [um], mesh forces [kN] and contact of response.nc, a row a speed [rpm]."""
+def describe_planar_response(data: xr.Dataset, run: Iterable[Finding] = ()) -> Block:
+    """Tabulate displacements [um], mesh forces [kN] and contact of response.nc, a row a speed [rpm].
+
+    The findings of the whole ``run`` give the order of the marks.
+    """
     varying = fluctuation(stored_harmonics(data, "mesh_force")).max(axis=1)
-    marks, doubtful = Marks(findings_in(data.attrs)), _tail_codes(data)
+    marks, doubtful = Marks(findings_in(data.attrs), run), _tail_codes(data)
     columns = {
         "speed [rpm]": lambda i: f"{float(data.speed[i]):.4g}",
         "mesh [Hz]": lambda i: f"{float(data.mesh_frequency[i]):.4f}",
