@@ -465,12 +465,14 @@ def _turned(value: object) -> object:
 class SensorSection(Section):
     """A sensor on the outer surface of the ring, which feels its motion in a direction.
 
-    ``direction`` is "radial", "tangential", or an angle from outwards, counter-clockwise.
+    ``direction`` is "radial", "tangential", or an angle from outwards, counter-clockwise. Over its ``width`` around
+    the ring it feels the mean, as an accelerometer on its base does.
     """
 
     name: Title
     angle: Angle
     direction: Annotated[Angle, BeforeValidator(_turned)] = 0.0
+    width: Annotated[float, Quantity(LENGTH, 0.0, 60.0)] = 0.0
 
 
 class StructureSection(Section):

@@ -184,7 +184,7 @@ CHANGES: tuple[dict[str, object], ...] = (
         "housing.microphone": {"level_limit": [{"speed": "1000 rpm", "level": 60.0}]},
     },
     {"housing.microphone": {"distance": "2 m", "angle": "40 deg"}},
-    {"housing.sensor": [{"name": "foot", "angle": "5 deg", "direction": "30 deg"}]},
+    {"housing.sensor": [{"name": "foot", "angle": "5 deg", "direction": "30 deg", "width": "9 mm"}]},
     {"housing.support": [SUPPORT], "housing.nodal_diameters": 4},
     {"housing.support": [SUPPORT | {"tangential_stiffness": "1e8 N/m"}], "housing.nodal_diameters": 5},
     {"housing.support": [SUPPORT | {"mass": "0.5 kg", "width": "10 mm"}], "housing.nodal_diameters": 4},

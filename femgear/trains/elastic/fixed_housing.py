@@ -257,7 +257,8 @@ def _ring_on_supports(
     """
     supports, points = housing_supports(case), 4 * (modes.max_diameter + 1)
     places = [(2 * np.pi * i / points, 0.0, 0.0, 1.0) for i in range(points)]
-    places += [(sensor.angle, sensor.direction, 0.0, 1.0) for sensor in case.housing.sensor]
+    radius = case.ring.outer_radius
+    places += [(sensor.angle, sensor.direction, sensor.width / radius, 1.0) for sensor in case.housing.sensor]
     for support in supports:
         for turned, stiffness in ((0.0, support.radial_stiffness), (0.5 * np.pi, support.tangential_stiffness)):
             places.append((support.angle, turned, support.width, stiffness))

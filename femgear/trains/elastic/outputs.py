@@ -71,15 +71,20 @@ def mesh_and_ring_outputs(
 
 
 def named_sensors(case: Case, dynamics: DynamicsResult) -> tuple[tuple[str, ...], np.ndarray]:
-    """Names and lines (speeds, n_sensors, n_orders) [m] of the sensors of a case on the ring."""
+    """Names and lines (speeds, n_sensors, n_orders) [m] of the sensors of a case on the ring.
+
+    A sensor of width w feels the wave of n nodal diameters times ``sin(x)/x``, ``x = n w/(2 R)``, its mean over w.
+    """
     carrier, lines = np.array([s.carrier for s in dynamics.speeds]), list[np.ndarray]()
+    n = np.arange(dynamics.ring_radial.shape[-1]) - dynamics.ring_radial.shape[-1] // 2
     for sensor in case.housing.sensor:
         field = math.cos(sensor.direction) * dynamics.ring_radial
         if math.sin(sensor.direction):
             field = field + math.sin(sensor.direction) * dynamics.ring_tangential
+        felt = field * np.sinc(n * sensor.width / case.ring.outer_radius / (2.0 * math.pi))
         place = dynamics.ring_teeth, carrier, sensor.angle
         options = {"symmetry": dynamics.symmetry, "periods": dynamics.response.periods}
-        lines.append(component_lines(field, *place, **options).displacement)
+        lines.append(component_lines(felt, *place, **options).displacement)
     return tuple(sensor.name for sensor in case.housing.sensor), np.stack(lines, axis=1)
 
 

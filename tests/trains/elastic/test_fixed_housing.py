@@ -185,6 +185,21 @@ def test_named_sensors(before, held):
         np.testing.assert_allclose(force[:, 1], 2e8 * moved[:, 4], rtol=0, atol=1e-9 * np.abs(force).max())
 
 
+@pytest.mark.parametrize("held", [{}, {"housing.support": FEET}])
+def test_a_wide_sensor_feels_the_mean_of_points_over_its_width(before, held):
+    place, share = np.polynomial.legendre.leggauss(8)
+    width = 0.03
+    places = 35.0 + np.degrees(0.5 * width / reference().ring.outer_radius) * place
+    points = [{"name": f"point {i}", "angle": f"{x:.15g} deg", "direction": "30 deg"} for i, x in enumerate(places)]
+    wide = {"name": "wide", "angle": "35 deg", "direction": "30 deg", "width": f"{width} m"}
+    case = reference(**{"housing.sensor": [wide, *points], **held})
+    moved = heard(case, *before).outputs["sensor"][1]
+    mean = np.einsum("spk,p->sk", moved[:, 1:], 0.5 * share)
+    np.testing.assert_allclose(moved[:, 0], mean, rtol=0, atol=1e-9 * np.abs(mean).max())
+    middle = moved[:, 1:][:, 3:5].mean(axis=1)
+    assert np.abs(mean - middle).max() > 1e-3 * np.abs(mean).max()
+
+
 @pytest.mark.slow
 def test_sensors_of_both_routes(before):
     """Next to no support at low speed: radial and tangential lines by two ways."""
