@@ -72,3 +72,32 @@ def test_public_functions_of_arrays_tell_a_shape():
                     without.append(f"{path.relative_to(PACKAGE)}: {name}")
     assert count > 700  # the walk found them
     assert without == []
+
+
+def words_on(name: str, docstring: str) -> str:
+    """Entry of a name in a docstring, and the sentences that hold it between backticks."""
+    entries = re.findall(r"(?m)^((?:\w+, )*\w+)(?: : |\n(?=    ))(.*(?:\n    .*)*)", docstring)
+    entry = [text for names, text in entries if name in names.split(", ")]
+    sentences = re.split(r"(?<=[.;:])\s", " ".join(docstring.split()))
+    return " ".join(entry + [sentence for sentence in sentences if f"`{name}`" in sentence])
+
+
+def test_arrays_of_public_dataclasses_tell_their_own_shape():
+    """In their entry or sentence, or by naming what they are shaped as."""
+    shaped = re.compile(SHAPE.pattern + "|(?:[Aa]s|see|of|for) `")
+    count, without = 0, []
+    for path in sorted(PACKAGE.rglob("*.py")):
+        for node in dataclasses(path):
+            arrays = [
+                one.target.id
+                for one in node.body
+                if isinstance(one, ast.AnnAssign) and re.match(r"np\.ndarray|NDArray", ast.unparse(one.annotation))
+            ]
+            if node.name.startswith("_"):
+                continue
+            docstring = ast.get_docstring(node) or ""
+            count += len(arrays)
+            names = [name for name in arrays if not shaped.search(words_on(name, docstring))]
+            without += [f"{path.relative_to(PACKAGE)}: {node.name}.{name}" for name in names]
+    assert count > 700  # the walk found them
+    assert without == []

@@ -67,9 +67,9 @@ class Step:
         Contact loads, and separations that remain, over the mean compliance [N].
     motions : (m,) array
         Over the mean compliance as well [N].
-    flips : integer array
+    flips : (f,) int array
         Candidates that pull, penetrate or must touch; empty when the problem is solved.
-    forced : integer array
+    forced : (g,) int array
         Those of `flips` that must touch to restrain a motion.
     null : (m, k) array
         Motions that no touching candidate restrains.

@@ -218,7 +218,7 @@ class Candidates:
         return (active[..., 0] & self.at_edge[0]) | (at_last & self.at_edge[1])
 
     def equal_cell_pressure(self, loads: np.ndarray) -> np.ndarray:
-        """Mean pressures of equal cells under loads (P, W, C) [N], however windows are divided [Pa]."""
+        """Compute mean pressures (P, W, C) [Pa] of equal cells under loads (P, W, C) [N], in any layout of windows."""
         pressure, area = np.zeros(loads.shape), self.setup.cell_area[self.mesh].mean(axis=(1, 2))
         for layout, of_cells in enumerate(equal_cells(self.setup.cells)):
             rows = self.layout == layout

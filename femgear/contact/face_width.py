@@ -264,9 +264,9 @@ def contacts_are_lines(
 ) -> np.ndarray:
     """Tell whether contacts of spur teeth are lines rather than points, (P, W, ...).
 
-    All arrays are (P, W, ...): loads [N], the length over the width on which they carry [m], whether this reaches an
-    end of it, and widths along the profile [m]. Slices are ``part`` [m] wide. One or two slices amid the width may
-    carry less than their length.
+    All arrays are (P, W, ...): ``load`` [N], the ``length`` over the width on which it carries [m], ``at_end``, whether
+    this reaches an end of it, and ``contact``, the width along the profile [m]. Slices are ``part`` [m] wide. One or
+    two slices amid the width may carry less than their length.
     """
     amid = ~at_end & (length < 2.5 * part) & (load > 0.25 * load.max(axis=(0, 1)))
     return ~((contact > 0.4 * length) | amid)

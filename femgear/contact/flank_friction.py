@@ -51,7 +51,7 @@ class WindowFriction:
 
 
 def path_sense(path: np.ndarray, base_pitch: float) -> np.ndarray:
-    """Give the sign of the sliding of gear 1 on gear 2 while gear 1 drives, by path coordinates (...) [m].
+    """Give the sign (...) of the sliding of gear 1 on gear 2 while gear 1 drives, by path coordinates (...) [m].
 
     At the pitch point, where flanks roll, that after it.
     """

@@ -97,9 +97,10 @@ def _in_mirror(names: Sequence[str], values: np.ndarray, planet: np.ndarray, ang
 def mapped_members(
     names: Sequence[str], values: np.ndarray, planet: np.ndarray, matrix: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Map vectors of members (m, P), named in pairs of x and y, by a matrix (2, 2), and give what follows.
+    """Map the vectors of members, named in pairs of x and y, by a matrix, and give what follows them.
 
-    Planet ``planet[i]`` of the values is planet i of what is found.
+    Of ``values`` (m, P) the first 2v rows are vectors. The ``matrix`` is (2, 2). With ``planet`` (N,) the planet
+    ``planet[i]`` of the values is planet i of the vectors that come out, (2v, P). Other rows come out as (m - 2v, P).
     """
     pairs = [name for name in names if name.endswith((": x", ": y"))][::2]
     vectors, rest = np.split(values, [2 * len(pairs)])
@@ -142,6 +143,6 @@ def same_pairs(path: np.ndarray, mesh: np.ndarray, later: int, pitch: float) -> 
 
 
 def in_slots(values: np.ndarray, slot: np.ndarray) -> np.ndarray:
-    """Take values (M, T, ...) from the slots (M, T), zero where the slot is T."""
+    """Take values (M, T, ...) of the same shape from the slots (M, T), zero where the slot is T."""
     padded = np.concatenate([values, np.zeros_like(values[:, :1])], axis=1)
     return padded[np.arange(len(values))[:, None], slot]

@@ -43,8 +43,10 @@ class LoadedTeeth:
 
     Parameters
     ----------
-    load, path, tooth, back_load, back_path, back_tooth : arrays
-        As ``tooth_load``, ``path`` ... of `MeshCycle`; positions in the order of the cycle.
+    load, path, back_load, back_path : (M, T, P) arrays
+        As ``tooth_load``, ``path`` ... of `MeshCycle` [N], [m]; positions in the order of the cycle.
+    tooth, back_tooth : (2, M, T) int arrays
+        Numbers of the teeth of gear 1 and gear 2 in every slot, as of `MeshCycle`.
     turn : (P,) int array
         Whole mesh periods passed at every position.
     periods : int

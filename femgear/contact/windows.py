@@ -395,7 +395,7 @@ def windows(  # noqa: PLR0913
         Separation that errors of position add to a whole pair [m].
     limits : (2, 2, ...) array, optional
         Smallest and largest roll length of the flanks of gear 1 and gear 2 [m] where not all are whole.
-    moved : float or array, broadcast with `zeta`
+    moved : float or (...) array, broadcast with `zeta`
         Path coordinates at which flanks stand beyond those that count the pairs [m].
     """
     counted = np.asarray(zeta, float)

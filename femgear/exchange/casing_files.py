@@ -140,7 +140,7 @@ def read_casing(
 
 
 def output_names(nodes: Path) -> tuple[str, ...]:
-    """Names of the outputs of a casing: its sensors, then "foot NAME x", "y" and "z", forces [N].
+    """List the outputs of a casing by name: its sensors, then "foot NAME x", "y" and "z", forces [N].
 
     Sensors of one name have their direction after it.
     """

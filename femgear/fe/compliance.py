@@ -181,7 +181,7 @@ def mirror_nodes(grid: Grid) -> np.ndarray:
 
 
 def mirrored_columns(columns: np.ndarray, image: np.ndarray) -> np.ndarray:
-    """Reflect displacement or load columns (2n, m) in the x axis; nodes' images (n,) as of `mirror_nodes`."""
+    """Reflect displacement or load columns (2n, m) in the x axis, to (2n, m); ``image`` (n,) is of `mirror_nodes`."""
     result = np.empty_like(columns)
     result[2 * image] = columns[0::2]
     result[2 * image + 1] = -columns[1::2]

@@ -132,7 +132,7 @@ def copy_nodes(grid: Grid, count: int) -> np.ndarray:
 
 
 def rotated_copies(grid: Grid, count: int) -> Grid:
-    """Whole body from one sector; the nodes on the cuts are merged.
+    """Make the grid of a whole body from one sector; the nodes on the cuts are merged.
 
     Parameters
     ----------

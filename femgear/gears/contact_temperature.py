@@ -115,7 +115,7 @@ def path_load_sharing(pair: GearPair, path: Any, overlap: float = 0.0, base_heli
 
 
 def mean_over_path(path: np.ndarray, values: np.ndarray) -> np.ndarray:
-    """Compute the mean of values (..., n) over path coordinates (n,), by trapezoids."""
+    """Compute the mean (...) of values (..., n) over path coordinates (n,) [m], by trapezoids."""
     return np.trapezoid(values, path, axis=-1) / (path[-1] - path[0])
 
 

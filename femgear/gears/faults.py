@@ -154,7 +154,7 @@ class Crack(ToothFault):
 
 
 def removed(faults: Sequence[ToothFault], roll: np.ndarray) -> np.ndarray:
-    """Compute what faults of one flank take off together [m] at roll lengths (...) [m].
+    """Compute what faults of one flank take off together (...) [m] at roll lengths (...) [m].
 
     A pit is as deep as its tooth is worn and its own depth; where pits lie over one another the deeper counts.
     """

@@ -174,7 +174,7 @@ def unit_vectors(angles: np.ndarray) -> np.ndarray:
 
 
 def across(vectors: np.ndarray) -> np.ndarray:
-    """Turn vectors (..., 2) along x and y by a right angle, counter-clockwise."""
+    """Turn vectors (..., 2) along x and y by a right angle, counter-clockwise, to (..., 2)."""
     return np.stack([-vectors[..., 1], vectors[..., 0]], axis=-1)
 
 

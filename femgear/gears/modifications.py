@@ -63,7 +63,7 @@ class ProfileModification(Modification):
     """A change of the profile, the same over the width."""
 
     def removed_at(self, gear: Gear, roll: np.ndarray) -> np.ndarray:
-        """Material removed [m] at roll lengths (...) on the flank [m]."""
+        """Compute the material removed (...) [m] at roll lengths (...) on the flank [m]."""
         raise NotImplementedError
 
     def knots(self, gear: Gear) -> tuple[float, ...]:
@@ -77,7 +77,7 @@ class LeadModification(Modification):
     varies_along_profile: ClassVar[bool] = False
 
     def removed_over(self, width: float, place: np.ndarray, height: Any) -> np.ndarray:
-        """Material removed [m] at places (...) from the middle of a width [m].
+        """Compute the material removed (...) [m] at places (...) from the middle of a width [m].
 
         Heights on the profile that broadcast with the places are -0.5 at the form circle and 0.5 at the tip.
         """
@@ -99,7 +99,7 @@ class _Law(ProfileModification):
         return start, default_end if self.end is None else self.end
 
     def removed_at(self, gear: Gear, roll: np.ndarray) -> np.ndarray:
-        """Material removed [m] at roll lengths (...) on the flank [m]."""
+        """Compute the material removed (...) [m] at roll lengths (...) on the flank [m]."""
         start, end = self.knots(gear)
         return self._removed((roll - start) / (end - start))
 
@@ -216,7 +216,7 @@ class MeasuredProfile(ProfileModification, kind="measured profile"):
     measured = True
 
     def removed_at(self, gear: Gear, roll: np.ndarray) -> np.ndarray:
-        """Material removed [m] at roll lengths (...) on the flank [m]."""
+        """Compute the material removed (...) [m] at roll lengths (...) on the flank [m]."""
         return np.interp(roll, self.roll, self.removed)
 
     def knots(self, gear: Gear) -> tuple[float, ...]:
@@ -235,7 +235,7 @@ class LeadSlope(LeadModification, kind="lead slope"):
     amount: float
 
     def removed_over(self, width: float, place: np.ndarray, height: Any) -> np.ndarray:
-        """Material removed [m] at places (...) from the middle of a width [m]."""
+        """Compute the material removed (...) [m] at places (...) from the middle of a width [m]."""
         return -0.5 * self.amount * (2.0 * place / width)
 
 
@@ -246,7 +246,7 @@ class LeadCrowning(LeadModification, kind="lead crowning"):
     amount: float
 
     def removed_over(self, width: float, place: np.ndarray, height: Any) -> np.ndarray:
-        """Material removed [m] at places (...) from the middle of a width [m]."""
+        """Compute the material removed (...) [m] at places (...) from the middle of a width [m]."""
         return self.amount * (2.0 * place / width) ** 2
 
 
@@ -261,7 +261,7 @@ class EndRelief(LeadModification, kind="end relief"):
     length: float
 
     def removed_over(self, width: float, place: np.ndarray, height: Any) -> np.ndarray:
-        """Material removed [m] at places (...) from the middle of a width [m]."""
+        """Compute the material removed (...) [m] at places (...) from the middle of a width [m]."""
         inside = (0.5 * width - np.abs(place)) / self.length
         return self.amount * np.maximum(1.0 - inside, 0.0) ** 2
 
@@ -287,7 +287,7 @@ class FlankTwist(LeadModification, kind="flank twist"):
     varies_along_profile = True
 
     def removed_over(self, width: float, place: np.ndarray, height: Any) -> np.ndarray:
-        """Material removed [m] at places (...) from the middle of a width [m], and heights on the profile."""
+        """Compute the material removed (...) [m] at places and heights (...) [m], [1] of a width [m]."""
         return -0.5 * self.amount * (2.0 * place / width) * height
 
 
@@ -305,7 +305,7 @@ class MeasuredLead(LeadModification, kind="measured lead"):
     measured = True
 
     def removed_over(self, width: float, place: np.ndarray, height: Any) -> np.ndarray:
-        """Material removed [m] at places (...) from the middle of a width [m]."""
+        """Compute the material removed (...) [m] at places (...) from the middle of a width [m]."""
         return np.interp(place, self.place, self.removed)
 
     def problem(self, gear: Gear) -> ModificationProblem | None:

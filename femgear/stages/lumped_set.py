@@ -427,7 +427,7 @@ def working_springs(problem: NonlinearSystem, members: Sequence[MemberBearing] =
 def mode_ratios(frequency: np.ndarray, ratios: float | Sequence[float] | np.ndarray) -> np.ndarray:
     """Assign damping ratios (m,) to modes of ascending frequency (m,) [Hz], from one of all modes or several.
 
-    Several are one a natural frequency (a pair of modes has one), ascending, the last one for the rest.
+    Several ``ratios`` (r,) are one a natural frequency (a pair of modes has one), ascending, the last for the rest.
     Motions at frequency zero have none and do not count.
     """
     given = np.atleast_1d(np.asarray(ratios, float))

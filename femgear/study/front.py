@@ -179,7 +179,7 @@ def _tell_of(front: ParetoFront) -> None:
 
 
 def non_dominated(values: np.ndarray) -> np.ndarray:
-    """Find the rows of (m, 2) values that no other row is below in one column and not above in the other."""
+    """Find the rows (k,) of values (m, 2) that no other row is below in one column and not above in the other."""
     order = np.lexsort((values[:, 1], values[:, 0]))
     lowest, kept = np.inf, []
     for i in order:

@@ -40,7 +40,7 @@ _LATEST_START = 0.93
 
 @dataclass(frozen=True)
 class Variable:
-    """One design variable.
+    """One design variable: entries of the case file, bounds and tolerance.
 
     Parameters
     ----------

@@ -51,7 +51,7 @@ _SMALLEST, _LEAST, _MOST_STEPS = 1e-4, 1e-5, 60
 
 @dataclass(frozen=True)
 class SearchOptions:
-    """How far a search goes.
+    """How far a search goes: samples, starts, generations, designs.
 
     Parameters
     ----------

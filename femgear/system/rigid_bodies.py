@@ -25,7 +25,7 @@ ROTATIONS = (3, 4, 5)
 
 @dataclass(frozen=True)
 class PlanarBody:
-    """A rigid body.
+    """A rigid body in its plane: mass, inertia and supports.
 
     Parameters
     ----------
@@ -195,7 +195,7 @@ class RigidSet(ABC):
 class PlanarSet(RigidSet):
     """Data of the lumped set; bodies, radii, angles and mesh stiffnesses as in `RigidSet`.
 
-    ``planet_bearing`` is the isotropic stiffness between planet and carrier, a number or one a planet [N/m];
+    ``planet_bearing`` is the isotropic stiffness between planet and carrier, a number or an (N,) array [N/m];
     infinite fixes the planet's axis to its pin. Published data are often rounded, or mix reference and
     working angles: radii that do not close are taken as they are, and `closure` tells by how much.
     """
@@ -252,8 +252,8 @@ class PlanarTorque:
 class HelicalSupport:
     """Isotropic support of a body in all six directions; infinite holds a motion, zero leaves it free.
 
-    ``radial`` and ``axial`` [N/m], ``tilt`` about the two axes in the plane and ``torsional`` about the axis of the
-    body [N m/rad]; as `HelicalSet.planet_bearing` the values may be (N,) arrays, one a planet.
+    Numbers or, as `HelicalSet.planet_bearing`, arrays of the planets: ``radial`` (N,) and ``axial`` (N,) [N/m],
+    ``tilt`` (N,) about the two axes in the plane and ``torsional`` (N,) about the axis of the body [N m/rad].
 
     CaseError: stiffnesses that are no numbers, negative or NaN (E-RANGE).
     """
@@ -275,7 +275,7 @@ class HelicalSupport:
 
 @dataclass(frozen=True)
 class HelicalBody:
-    """A rigid body.
+    """A rigid body in space: mass, inertias and supports.
 
     CaseError: mass or inertias that are not finite and above 0 (E-RANGE).
 

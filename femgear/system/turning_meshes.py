@@ -183,7 +183,7 @@ def independent_directions(directions: np.ndarray, mass: np.ndarray) -> np.ndarr
 
 
 def turned_row(row: np.ndarray) -> np.ndarray:
-    """Turn the approach (..., 6) per unit of the motions of a place on the axis by a quarter of a turn."""
+    """Turn the approach (..., 6) per unit of the motions of a place on the axis by a quarter of a turn, to (..., 6)."""
     turned = np.zeros_like(row)
     for first in (0, 3):
         turned[..., first], turned[..., first + 1] = -row[..., first + 1], row[..., first]

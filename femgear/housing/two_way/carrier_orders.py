@@ -263,7 +263,10 @@ def receptance(structure: FixedStructure, omega: np.ndarray) -> np.ndarray:
 
 
 def modal_receptance(natural: np.ndarray, ratio: np.ndarray, omega: np.ndarray) -> np.ndarray:
-    """Compute receptances (..., m) [s^2] of modes (m,) [rad/s] at angular frequencies (...) [rad/s]."""
+    """Compute receptances (..., m) [s^2] of modes at angular frequencies ``omega`` (...) [rad/s].
+
+    ``natural`` (m,) are their natural angular frequencies [rad/s], ``ratio`` (m,) their damping ratios [1].
+    """
     omega = np.asarray(omega)[..., None]
     stiffness = np.empty((*omega.shape[:-1], len(natural)), complex)
     stiffness.real, stiffness.imag = natural**2 - omega**2, 2.0 * ratio * natural * omega

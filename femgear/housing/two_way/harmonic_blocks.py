@@ -83,7 +83,11 @@ class HarmonicBlocks:
         return replace(self, compliance=compliance, spring=spring, yielding=self.yielding[numbers])
 
     def forces(self, extra: np.ndarray, deflection: np.ndarray, way: np.ndarray) -> np.ndarray:
-        """Forces f (J, B, R) of the meshes by forces e beyond k0 and deflections of that shape, and u (G, B, R)."""
+        """Compute the forces f (J, B, R) [N] of the meshes.
+
+        ``extra`` (J, B, R) are the forces e beyond k0 [N], ``deflection`` (J, B, R) [m] those of the meshes, ``way``
+        (G, B, R) [m] the displacements u of the ring.
+        """
         force = extra + self.gears.mean[:, None, None] * deflection
         force[len(way) :] -= self.gears.mean[len(way) :, None, None] * way
         return force
@@ -211,7 +215,7 @@ def _times(matrix: np.ndarray, values: np.ndarray) -> np.ndarray:
 
 
 def complex_times(values: np.ndarray, real: np.ndarray) -> np.ndarray:
-    """Multiply a complex matrix (..., k) by a real one (k, m), half the work of a complex one."""
+    """Multiply a complex matrix (..., k) by a real one (k, m), to (..., m): half the work of a complex one."""
     product = np.empty((*values.shape[:-1], real.shape[1]), complex)
     # BLAS does not take the parts of complex numbers as they lie
     product.real = rows_times(np.ascontiguousarray(np.real(values)), real)
@@ -220,6 +224,6 @@ def complex_times(values: np.ndarray, real: np.ndarray) -> np.ndarray:
 
 
 def rows_times(values: np.ndarray, matrix: np.ndarray) -> np.ndarray:
-    """Multiply rows (..., k) by a matrix (k, m) at once: faster than a stack of small matrices."""
+    """Multiply rows (..., k) by a matrix (k, m) at once, to (..., m): faster than a stack of small matrices."""
     rows = values.reshape(math.prod(values.shape[:-1]), values.shape[-1])
     return (rows @ matrix).reshape(*values.shape[:-1], matrix.shape[1])

@@ -276,9 +276,10 @@ class RunningStage(ReadOnlyArrays):
         return dynamic.reshape(*omega.shape, *M.shape)
 
     def shared(self, whole: np.ndarray, omega: np.ndarray) -> np.ndarray:
-        """Compliances (..., G, C, G, C) by bodies in common at whole orders (...) and frequencies [m/N].
+        """Compute the compliances (..., G, C, G, C) [m/N] by bodies in common.
 
-        Of a pattern of the planets: whole orders are those of the carrier with the number of the pattern.
+        ``whole`` (...) are the orders of the carrier with the number of a pattern of the planets, ``omega`` (...) their
+        angular frequencies [rad/s].
         """
         assert self.flexibility is not None
         leaders, group, turn = self.groups
@@ -349,7 +350,7 @@ class RunningResponse(ReadOnlyArrays):
         return self.one_sided(self.modal @ shape)
 
     def one_sided(self, values: np.ndarray) -> np.ndarray:
-        """Amplitudes of two-sided values (Q + 1, S, k), see `lines`."""
+        """Give the one-sided amplitudes (Q + 1, S, k) of two-sided values (Q + 1, S, k), see `lines`."""
         amplitudes = 2.0 * values
         amplitudes[0, self.band < 0] = 0.0
         amplitudes[0, self.band == 0] *= 0.5

@@ -140,7 +140,7 @@ class FixedStructure(ReadOnlyArrays):
         return self.ring_shape.shape[1] // 2
 
     def moved_by(self, waves: np.ndarray) -> np.ndarray:
-        """Numbers of the modes that have some of the waves (2 n_max + 1,) bool of the path or of the ring."""
+        """Find numbers (k,) of the modes that have some of the waves (2 n_max + 1,) bool of the path or of the ring."""
         n = np.arange(-self.max_diameter, self.max_diameter + 1)
         moved = np.zeros(len(self.natural_frequency), bool)
         for shape, order in ((self.ring_shape, n), (self.wave_shape, self.wave_order)):

@@ -51,7 +51,7 @@ class Curve:
         Unknowns, in order along the curve, in their own units as the parameter.
     parameter : (p,) array
         In its own unit.
-    folds, branch_points : int arrays
+    folds, branch_points : (f,) and (b,) int arrays
         Indices of the points that are limit points and branch points.
     closed : bool
         The last point is the first one again.

@@ -73,10 +73,10 @@ class ModalForces:
 
 @dataclass(frozen=True)
 class Crossings:
-    """Meetings of a mesh harmonic with a natural frequency that it excites, (c,) each, by mesh frequency.
+    """Meetings of a mesh harmonic with a natural frequency that it excites, by mesh frequency.
 
-    ``row`` are numbers of natural frequencies in `ModalForces`, ``harmonic`` those of mesh harmonics from 1,
-    ``mesh_frequency`` is in Hz.
+    ``row`` (c,) are numbers of natural frequencies in `ModalForces`, ``harmonic`` (c,) those of mesh harmonics from 1,
+    ``mesh_frequency`` (c,) is in Hz.
     """
 
     row: np.ndarray
@@ -182,7 +182,7 @@ def unresolved(speeds: np.ndarray, resonance: np.ndarray, level_times_damping: n
     """Count the resonances (c,) that matter with no speed (s,) within half the half width of their peaks.
 
     There an amplitude is 11 % below its peak. Those count of which a twentieth of the highest level is
-    expected; arguments as of `refined_speeds`.
+    expected. ``level_times_damping`` and ``damping`` (c,) are those of the resonances, as of `refined_speeds`.
     """
     expected = level_times_damping / np.where(damping > 0.0, damping, np.inf)
     counted = (expected > 0.05 * expected.max(initial=0.0)) & (resonance >= speeds[0]) & (resonance <= speeds[-1])

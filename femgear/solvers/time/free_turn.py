@@ -94,8 +94,8 @@ class StepBlock:
     """Loads and meshes at the instants (t,) of a block of steps, its start included.
 
     ``loads`` (t, d): one for the constant load, then the torques [N m]; ``selection`` (t, m, c): ``S`` of the
-    contacts; ``stiffness`` and ``gap`` (t, c) [N/m], [m]; of the rotation ``angle`` [rad], ``speed`` [rad/s],
-    ``torque`` and, without regard to signs, ``effort`` [N m].
+    contacts; ``stiffness`` and ``gap`` (t, c) [N/m], [m]. Of the rotation are ``angle`` (t,) [rad], ``speed`` (t,)
+    [rad/s], ``torque`` (t,) and, without regard to signs, ``effort`` (t,) [N m].
     """
 
     loads: np.ndarray

@@ -140,7 +140,7 @@ class SpunSystem:
         return float(direction @ self.spin)
 
     def without_drive(self, load: np.ndarray) -> np.ndarray:
-        """Take from a load (n,) what drives the rotation."""
+        """Take from a load (n,) [N, N m] what drives the rotation; the rest is (n,)."""
         return load - self.carried * (self.spin @ load) / self.inertia
 
     def selection(self, angle: np.ndarray) -> np.ndarray:
@@ -154,7 +154,7 @@ class SpunSystem:
         return whole
 
     def at_phases(self, table: np.ndarray, angle: np.ndarray) -> np.ndarray:
-        """Interpolate one of the tables (t, c) at angles (t',) of the shaft [rad]."""
+        """Interpolate one of the tables (t, c) at angles (t',) of the shaft [rad], to (t', c)."""
         if len(table) == 1:
             return np.broadcast_to(table, (len(angle), table.shape[1]))
         steps = len(table) - 1
@@ -166,8 +166,8 @@ class SpunSystem:
     def mesh_forces(self, approach: np.ndarray, stiffness: np.ndarray, gap: np.ndarray, *, parts: bool) -> np.ndarray:
         """Compute forces (..., M) [N] of the meshes, drive less back flank.
 
-        From approach [m], stiffness [N/m] and gap [m] of the contacts, (..., c) each. Without ``parts`` flanks may
-        pull, and there are no back flanks.
+        From ``approach`` (..., c) [m], ``stiffness`` (..., c) [N/m] and ``gap`` (..., c) [m] of the contacts. Without
+        ``parts`` flanks may pull, and there are no back flanks.
         """
         force = stiffness * (approach - gap)
         if not parts:
@@ -179,7 +179,7 @@ class SpunSystem:
         return total
 
     def touching(self, approach: np.ndarray, gap: np.ndarray) -> np.ndarray:
-        """Tell of meshes (..., M) whether one of their flanks touches; of contacts approach and gap (..., c) [m]."""
+        """Tell of meshes (..., M) whether one of their flanks touches, from ``approach`` and ``gap`` (..., c) [m]."""
         overlap = approach - gap >= 0.0
         touched = overlap[..., self.drives].copy()
         behind = np.flatnonzero(self.side == BACK)

@@ -43,9 +43,10 @@ twice a frequency carry the response there."""
 
 @dataclass(frozen=True)
 class FrequencyLimit:
-    """Where excitation and response end at every speed, all (n_speeds,).
+    """Where excitation and response end at every speed.
 
-    ``excitation`` and ``response`` are the numbers of harmonics, ``frequency`` is the highest of the excitation [Hz].
+    ``excitation`` and ``response`` (n_speeds,) are the numbers of harmonics, ``frequency`` (n_speeds,) is the highest
+    of the excitation [Hz].
     """
 
     excitation: np.ndarray

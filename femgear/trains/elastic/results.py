@@ -371,7 +371,7 @@ class DynamicsResult(StageResult):
         Dynamic transmission error of every mesh, the deflection of the ring included [m].
     ring_radial : (speeds, H + 1, 2 n_max + 1) complex array
         Circumferential components of the radial displacement of the ring at its outer surface [m].
-    ring_tangential : array
+    ring_tangential : (speeds or 1, H + 1, 2 n_max + 1) complex array
         The same of the tangential displacement, at all speeds where a sensor of the case hears it, else at the last.
     ring_teeth : int
         Teeth of the ring: the carrier order of the mesh frequency.

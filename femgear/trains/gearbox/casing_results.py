@@ -49,7 +49,10 @@ def casing_variables(every: Sequence[Deflection]) -> dict[str, tuple]:
 
 
 def seat_motions(case: GearboxCase, casing: CasingModel, motion: np.ndarray) -> np.ndarray:
-    """Compute the motions (b, 3) of the casing at all bearings in it [m]; NaN at others, 0 in what stands still."""
+    """Compute the motions (b, 3) of the casing at all bearings in it [m]; NaN at others, 0 in what stands still.
+
+    ``motion`` (6n,) are the motions of all stations [m], [rad].
+    """
     motions = np.full((len(case.bearing), 3), np.nan)
     motion = motion.reshape(-1, 6)
     for number, bearing in enumerate(case.bearing):

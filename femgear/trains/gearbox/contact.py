@@ -146,7 +146,7 @@ def given_separation(stage: PairSection | BoxPlanetarySection, torque: float) ->
 
 
 def unequal_separation(separation: np.ndarray) -> np.ndarray:
-    """Leave of separations (M,) of meshes what rotations of the gears do not take up: none of a pair [m].
+    """Leave of separations (M,) of meshes what rotations of the gears do not take up, (M,), none of a pair [m].
 
     Rotation of a planet takes from its mesh with the sun what it adds to that with the ring, rotation of the sun the
     same of all planets. What is left of both meshes of a planet is half of their sum less the mean of all planets.

@@ -156,7 +156,7 @@ class BearingLaw:
         return RadialBearings(columns, self.section.radial * self.factor, 0.5 * self.section.clearance)
 
     def share(self, stiffness: np.ndarray) -> np.ndarray:
-        """Take from the stiffness (6, 6) of a bearing that of this law: of springs, which hold other motions too."""
+        """Take from the stiffness (6, 6) of a bearing that of this law, (6, 6): springs hold other motions too."""
         holds = self.held > 0.0
         return stiffness if self.section.kind is not None else np.where(holds[:, None] & holds, stiffness, 0.0)
 
@@ -189,7 +189,7 @@ def laws_of(model: GearboxModel, factor: float = 1.0) -> list[tuple[int, Bearing
 
 
 def mesh_slopes(assembly: Assembly, motion: np.ndarray) -> np.ndarray:
-    """Compute the slopes of the approach of all meshes along their widths [rad] from the motions (6n,)."""
+    """Compute the slopes (M,) of the approach of all meshes along their widths [rad] from the motions (6n,)."""
     approach = assembly.columns.T @ motion
     slopes = np.zeros(len(assembly.contacts))
     for number, (contact, part) in enumerate(zip(assembly.contacts, assembly.slices, strict=True)):
@@ -199,7 +199,7 @@ def mesh_slopes(assembly: Assembly, motion: np.ndarray) -> np.ndarray:
 
 
 def mesh_separation(assembly: Assembly, motion: np.ndarray) -> np.ndarray:
-    """Compute how far motions (6n,) take the flanks of every mesh apart along the normal [m]."""
+    """Compute how far (M,) motions (6n,) take the flanks of every mesh apart along the normal [m]."""
     approach = assembly.columns.T @ motion
     return np.array([-approach[part].mean() for part in assembly.slices])
 

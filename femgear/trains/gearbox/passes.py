@@ -85,7 +85,10 @@ def _lengths(model: GearboxModel, positions: MeshPositions) -> np.ndarray:
 
 
 def slopes_agree(model: GearboxModel, new: np.ndarray, old: np.ndarray, tolerance: float, least: float) -> bool:
-    """Whether slopes (M,) [rad] agree: their difference over the width against the misalignment, or a least one [m]."""
+    """Whether slopes ``new`` and ``old`` (M,) [rad] agree.
+
+    Their difference over the width counts against the misalignment, or the ``least`` one [m] where that is more.
+    """
     for stage in model.stages:
         for mesh in stage.meshes:
             size = max(abs(new[mesh]) * stage.width, least)

@@ -33,22 +33,22 @@ _MATTERS = 0.05
 
 @dataclass(frozen=True)
 class GearboxResonances:
-    """Meetings of a mode of a gearbox with a mesh harmonic, (c,) arrays.
+    """Meetings of a mode of a gearbox with a mesh harmonic.
 
     Parameters
     ----------
-    speed : array
+    speed : (c,) array
         Of the reference shaft [rad/s].
-    heard : array
+    heard : (c,) array
         What is heard far above the mode, r.m.s. over all sensors [m/s^2]: `femgear.solvers.linear.resonances`.
         Without sensors that of the approach of the flanks.
-    damping : array
+    damping : (c,) array
         Damping ratio of the mode [1].
     stage : tuple of str
         Stage whose harmonic meets the mode.
-    harmonic : int array
+    harmonic : (c,) int array
         Mesh harmonic.
-    frequency : array
+    frequency : (c,) array
         Of the mode [Hz].
     """
 

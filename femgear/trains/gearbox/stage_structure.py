@@ -404,9 +404,10 @@ def rubbing_rows(state: Deflection, stage: StageModel) -> tuple[list[Row], np.nd
 
 
 def equal_planets(assembly: Assembly, meshes: Sequence[int], planets: int, stiffness: np.ndarray) -> np.ndarray:
-    """Give every slice (g,) of meshes, kind by kind, the mean of the planets [N/m], one after the other stands there.
+    """Give every slice of meshes, kind by kind, the mean of the planets, one after the other stands there.
 
-    Where planets stand, some slices may carry nothing, as weight and bending shafts have it.
+    ``stiffness`` (g,) [N/m] is that of all slices, before and after. Where planets stand, some slices may carry
+    nothing, as weight and bending shafts have it.
     """
     averaged = stiffness.copy()
     for alike in np.reshape(meshes, (-1, planets)):

@@ -211,6 +211,8 @@ def wave_generator(planets: TurningPlanets, count: int) -> np.ndarray:
 def centrifugal_pull(assembly: Assembly, planets: TurningPlanets, mass: np.ndarray) -> np.ndarray:
     """Compute the stiffness (6s, 6s) of the pull of the pins on turning planets, which turns with the carrier.
 
+    ``mass`` (6s, 6s) [kg], [kg m], [kg m^2] is that of all stations.
+
     Of the pull ``F = m r speed^2`` at a station ``r`` from the axis, displaced by x, the turn phi of the carrier that
     holds it has the energy ``(phi x F) . x - (phi x F) . (phi x r)/2``: along the radius a ``F (phi_z x_t - phi_t x_z)
     - F a (phi_z^2 + phi_t^2)/2``. Moments that the mass of a shaft takes at its stations turn with it about z.

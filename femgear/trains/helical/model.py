@@ -250,11 +250,11 @@ def helical_excitation(record: MeshExcitation, overlap_ratio, *, slices: int = 1
 def helical_friction(
     cycle: MeshCycle, overlap_ratio: np.ndarray, *, slices: int = 1, hand: int = 1, reversed_time: bool = False
 ) -> np.ndarray | None:
-    """Make the loads (4N S + 1, P) of friction on all slices from the record of spur teeth; None without.
+    """Make the loads (4N S + 1, P) of friction on all slices from the record of spur teeth; None without friction.
 
     Forces along the flanks [N], then their moments about the pitch points [N m], as they act on the coordinates along
-    `femgear.system.mesh_directions.friction_directions`, and zeros for what takes their mean. Slices are those of
-    `helical_excitation`.
+    `femgear.system.mesh_directions.friction_directions`, and zeros for what takes their mean. Slices and
+    ``overlap_ratio`` (2N,) [1] are those of `helical_excitation`.
     """
     if cycle.friction_force is None or cycle.friction_moment is None:
         return None

@@ -500,8 +500,8 @@ def _phases(orders: np.ndarray) -> np.ndarray:
 def shown_points(rms: np.ndarray, back: np.ndarray, stable: np.ndarray) -> list[tuple[int, str]]:
     """Choose points of a branch to draw over the phase, in order, with what they are; the last is the top.
 
-    Along the branch, (p,) each: amplitude, share of the cycle in which back flanks touch, and stability: 1
-    where known to be stable, 0 where known not to be, -1 where not known.
+    Along the branch are ``rms`` (p,), the amplitude, ``back`` (p,), the share of the cycle in which back flanks touch,
+    and ``stable`` (p,): 1 where known to be stable, 0 where known not to be, -1 where not known.
     """
     sure = stable == 1
     top, words = int(np.argmax(rms)), "largest response"

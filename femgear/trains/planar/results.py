@@ -195,10 +195,10 @@ class BranchResult(StageResult):
 
 @dataclass(frozen=True)
 class PlanarResponseResult(StageResult):
-    """Responses of the ``planetary_set`` to weight and mesh frequency together, one at every ``input_speed`` [rad/s].
+    """Responses of the ``planetary_set`` to weight and mesh frequency together.
 
-    ``speeds`` are those of the members, ``solutions`` the lines of the deflections, ``lines`` the motions and forces
-    that follow from them, all of length (speeds,).
+    ``input_speed`` (speeds,) is that of every response [rad/s], ``speeds`` are those of the members, ``solutions`` the
+    lines of the deflections, ``lines`` the motions and forces that follow from them, all of length (speeds,).
     """
 
     planetary_set: PlanetarySet
