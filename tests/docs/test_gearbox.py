@@ -1,6 +1,7 @@
 """What docs/gearbox.md shows of casings is what is read."""
 
 import csv
+import json
 import re
 import tomllib
 from io import StringIO
@@ -9,6 +10,7 @@ from pathlib import Path
 import pytest
 from small_gearbox import pair_tables
 
+from femgear.app.fields import help_of
 from femgear.exchange.node_tables import read_nodes
 from femgear.exchange.superelement import SUPERELEMENT_ROLES
 from femgear.trains.gearbox.case_file import BoxBearingSection, BoxCasingSection, embed_stages
@@ -16,7 +18,7 @@ from femgear.trains.gearbox.deflection import solve_deflection
 from femgear.trains.gearbox.sensors import sensor_rows
 from femgear.trains.gearbox.stages import solve_deflections
 from femgear.trains.reading import read_case
-from validation.tools import gearbox_keys
+from validation.tools import form_help, gearbox_keys
 
 PAGE = (Path(__file__).parents[2] / "docs" / "gearbox.md").read_text(encoding="utf-8")
 CASING = PAGE[PAGE.index("## The casing") : PAGE.index("## What comes out")]
@@ -52,6 +54,25 @@ def test_the_table_of_keys_is_that_of_the_sections():
     rows = dict(re.findall(r"^\| `\[\[bearing\]\]` \| `(\w+)` \| .* \| (.*) \|$", PAGE, flags=re.M))
     assert rows.keys() == BoxBearingSection.model_fields.keys()
     assert rows["shaft"] == "needed" and rows["inner_osculation"] == "0.52" and rows["estimated"] == "`false`"
+
+
+def test_every_key_has_a_meaning_that_the_form_of_the_app_shows():
+    meanings = gearbox_keys.meanings_on(PAGE)
+    assert len(meanings) == len(re.findall(r"(?m)^\| .*\| `\w+` \|", gearbox_keys.table(meanings)))
+    assert [key for key, meaning in meanings.items() if not meaning] == []
+    assert help_of("bearing[0].preload") == meanings["`[[bearing]]`", "preload"]
+    assert help_of("planetary[1].planet.bearing.tilt") == meanings["`[planetary.planet.bearing]`", "tilt"]
+    # an entry that a set has too keeps the words of docs/case_file.md
+    assert help_of("operation.load_case[0].share") == "of the running time; all shares add up to 1 within 0.001, " + (
+        "and are divided by their sum. Default: 1"
+    )
+
+
+def test_the_help_of_the_form_is_that_of_the_pages():
+    texts = json.loads(form_help.TARGET.read_text("utf-8"))
+    written = dict(form_help.help_texts(form_help.SOURCE.read_text("utf-8")))
+    written |= dict(form_help.gearbox_texts(PAGE, written))
+    assert texts.keys() == written.keys(), "run python validation/tools/form_help.py"
 
 
 @pytest.mark.slow

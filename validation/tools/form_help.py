@@ -1,14 +1,18 @@
-"""Write femgear/app/help.json, what the form of the app says of entries, from the tables of docs/case_file.md."""
+"""Write femgear/app/help.json, what the form of the app says of entries.
+
+From the tables of docs/case_file.md, and for entries of a gearbox from its table of keys in docs/gearbox.md.
+"""
 
 from __future__ import annotations
 
 import json
 import re
-from collections.abc import Iterator
+from collections.abc import Container, Iterator
 from pathlib import Path
 
 ROOT = Path(__file__).parents[2]
 SOURCE, TARGET = ROOT / "docs" / "case_file.md", ROOT / "femgear" / "app" / "help.json"
+GEARBOX = ROOT / "docs" / "gearbox.md"
 _LISTS = {"modifications": "modifications", "errors": "errors", "load": "load_case"}
 """Entries whose tables have a heading of their own, by the first word of that."""
 
@@ -40,6 +44,17 @@ def help_texts(text: str) -> Iterator[tuple[str, str]]:
             header = header if line.strip() else []
 
 
+def gearbox_texts(text: str, known: Container[str]) -> Iterator[tuple[str, str]]:
+    """Read what the table of keys says of entries of a gearbox, but for those that are ``known`` by their last names.
+
+    Names have three parts at most, as many as the form looks for.
+    """
+    for path, key, meaning in re.findall(r"(?m)^\| `\[+([\w.]+)\]+` \| `(\w+)` \| ([^|]+) \| [^|]+ \| [^|]+ \|$", text):
+        parts = f"{path}.{key}".split(".")
+        if ".".join(parts[-2:]) not in known:
+            yield ".".join(parts[-3:]), plain(meaning)
+
+
 def plain(cell: str) -> str:
     """Take the marks of Markdown out of a cell."""
     text = re.sub(r"\[([^\]]+)\]\([^)]*\)", r"\1", cell)
@@ -49,6 +64,7 @@ def plain(cell: str) -> str:
 def main() -> None:
     """Write the file."""
     texts = dict(sorted(help_texts(SOURCE.read_text("utf-8")), reverse=True))
+    texts |= dict(gearbox_texts(GEARBOX.read_text("utf-8"), texts))
     TARGET.write_text(json.dumps(dict(sorted(texts.items())), ensure_ascii=False, indent=1) + "\n", "utf-8")
 
 

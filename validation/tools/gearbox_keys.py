@@ -1,12 +1,15 @@
 #!/usr/bin/env python3
 """Write the table of all keys of a gearbox case in docs/gearbox.md, from the sections that read them::
 
-python validation/tools/gearbox_keys.py
+    python validation/tools/gearbox_keys.py
+
+What a key means is written by hand on the page, and stays there.
 """
 
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
@@ -26,23 +29,30 @@ DIMENSIONS = {
 }
 
 
-def table() -> str:
-    """Make the table as Markdown: section, key, value, default."""
+def meanings_on(text: str) -> dict[tuple[str, str], str]:
+    """Read what the page says that keys mean, by table and key."""
+    rows = re.findall(r"(?m)^\| (\S*) ?\| `(\w+)` \| (.*?) ?\| .* \| .* \|$", text.split(BEGIN)[1].split(END)[0])
+    return {(path, key): meaning for path, key, meaning in rows}
+
+
+def table(meanings: Mapping[tuple[str, str], str]) -> str:
+    """Make the table as Markdown: section, key, meaning, value, default."""
     schema = GearboxCase.model_json_schema()
-    lines = ["| table | key | value | default |", "|---|---|---|---|"]
+    lines = ["| table | key | meaning | value | default |", "|---|---|---|---|---|"]
     for path, section in _sections(schema, schema, ""):
         required = section.get("required", ())
         for key, entry in section["properties"].items():
             plain = _plain(entry)
             default = "needed" if key in required else _default(plain, entry.get("default"))
-            lines.append(f"| {path} | `{key}` | {_value(plain)} | {default} |".replace("|  |", "| |"))
+            cells = path, f"`{key}`", meanings.get((path, key), ""), _value(plain), default
+            lines.append(f"| {' | '.join(cells)} |".replace("|  |", "| |"))
     return "\n".join(lines) + "\n"
 
 
 def page_with_table(text: str) -> str:
     """Put the table between its marks on the page."""
     before, rest = text.split(BEGIN)
-    return f"{before}{BEGIN}\n\n{table()}\n{END}{rest.split(END)[1]}"
+    return f"{before}{BEGIN}\n\n{table(meanings_on(text))}\n{END}{rest.split(END)[1]}"
 
 
 def _sections(schema: Mapping[str, Any], section: Mapping[str, Any], path: str) -> Iterator[tuple[str, Any]]:
