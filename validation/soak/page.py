@@ -11,37 +11,36 @@ from validation.soak.trials import KINDS, Tally
 
 HEAD = """# Reliability
 
-What femgear does with hostile case files, damaged results, killed processes and failing systems. The short
-forms run with `make test`; `make soak` goes on for as many minutes as one likes (`make soak MINUTES=60`),
-each time from where it was, and writes this page. Every trial follows from its kind and number:
-`python validation/soak KIND NUMBER` repeats it.
+What femgear does with hostile case files, damaged results, killed processes and failing systems. Short
+forms run with `make test`. `make soak MINUTES=60` goes on for that many minutes from where it was, and
+writes this page. `python validation/soak KIND NUMBER` repeats a trial by its kind and number.
 """
 WORDS = {
     "case_text": (
         "Case files",
-        """Case files of the repository with changed numbers, units, texts and keys, cut at every byte, with
-lines missing, repeated or exchanged, nested, up to 10 MB. Each is described or refused within 1 s
-of CPU time and 500 MB.""",
+        """Case files of the repository with changed numbers, units, texts and keys. Some are cut at any byte,
+have lines missing, repeated or exchanged, are nested, or have up to 10 MB. Each is described or
+refused within 1 s of CPU time and 500 MB.""",
     ),
     "damage": (
         "Damaged files",
         """Results, manifests, cases as run, journals of sweeps and cached grids with changed, missing or
-foreign contents. The numbers are the same as before, or refused; no reader crashes. "Own
-checksums": the manifest was made to fit the damage, so that numbers may differ, but nothing may
-crash.""",
+foreign contents. The numbers are the same as before, or refused, and no reader crashes. In trials
+of "own checksums" the manifest fits the damage: numbers may differ there, but nothing may crash.""",
     ),
     "kills": (
         "Kills",
         """Runs, runs over old results, sweeps and searches, ended by SIGKILL, SIGTERM or SIGINT at a random
-moment. The same command then goes on, leaves the same bits as one that nothing disturbed, computes
-no finished stage or design again and leaves nothing behind.""",
+moment. The same command then goes on and ends with the same bits as one that nothing disturbed. It
+computes no finished stage or design again and leaves no other files behind.""",
     ),
     "faults": (
         "Faults",
-        """Full, read-only and failing disks, no home, no folder for temporary files, standard output closed,
-full or of few letters, limits of memory, file size and open files, clocks that jump, two processes
-in one folder. The number behind the colon is the exit code. Each ends with a documented one and one
-message, leaves old results whole, and the same command works afterwards.""",
+        """Disks that are full, read-only or fail; no home and no folder for temporary files. Standard output
+that is closed, full or takes ASCII only. Limits of memory, file size and open files, clocks that
+jump, two processes in one folder. The number behind the colon is the exit code. Each trial ends
+with a documented code and one message, and leaves old results whole. The same command works
+afterwards.""",
     ),
     "sets": (
         "Random planetary sets",
@@ -50,9 +49,9 @@ static limit of the dynamics.""",
     ),
     "determinism": (
         "Bits",
-        """The same files, bit for bit, with one or two BLAS threads, known and new grids, any installed
-locale, hash seed, time zone, level of optimisation and folder. Times are left out: they stand in
-the manifest, the journals and the report.""",
+        """The same files, bit for bit, with one or two BLAS threads, and with known or new grids. Locale, hash
+seed, time zone, level of optimisation and folder do not matter either. Times are left out: they
+stand in the manifest, the journals and the report.""",
     ),
 }
 KNOWN = """## What may differ or fail, and why
@@ -63,8 +62,8 @@ KNOWN = """## What may differ or fail, and why
   versions.
 * With a limit below 600 MB (`ulimit -v`, `-d`) femgear does not begin: loading its libraries would end or
   stop the process. Scripts import NumPy first, whose own message then comes. Where memory ends later,
-  E-MEMORY says so; within compiled libraries (BLAS, HDF5) it may also end the process; results on disk are
-  whole then, as after a kill.
+  E-MEMORY says so. Within compiled libraries (BLAS, HDF5) that may also end the process. Results on disk
+  are whole then, as after a kill.
 """
 # results of a kind that are listed
 _MOST = 40
@@ -115,7 +114,7 @@ def _summary(state: State, last: str, found: dict[str, tuple[list[dict], Tally]]
     day = time.strftime("%Y-%m-%d", time.gmtime(max(record["ended"] for record in records)))
     before = [record for record in state.records if record["commit"] != last]
     lines = [
-        f"Commit {last} (what later ones change in femgear/ or scripts/ is not part of it), until {day}:",
+        f"Commit {last} until {day}, without later changes of femgear/ and scripts/:",
         f"{60 * hours:.0f} minutes of processes on {records[-1]['machine']}.",
         "",
         "| | pieces | trials | failures | most CPU time [s] | most memory [MB] | minutes |",
