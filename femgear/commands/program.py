@@ -15,7 +15,7 @@ from femgear.errors import CaseError
 app = App(
     name="femgear",
     version=lambda: femgear.__version__,
-    help="Planetary gear sets: from tooth geometry to the vibration heard on the housing.",
+    help="Gear sets and gearboxes: from tooth geometry to the vibration and the sound at the housing.",
     help_format="plaintext",
     suppress_keyboard_interrupt=False,
 )

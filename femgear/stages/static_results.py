@@ -65,8 +65,8 @@ _COUNTING = (
     "crossings of zero, ASTM E1049)"
 )
 HELD = "all centres held"
-SERIES = "of planet-ring with the ring on its foundation in series: no stiffness of the teeth alone"
-"""What a mesh stiffness is, where members move."""
+SERIES = "of planet-ring with the ring's foundation; the STE with all supports"
+"""What mesh stiffness and transmission error contain where members move."""
 _PIN_FORCE = "force of the pin on the planet in the frame of the carrier"
 _EQUIDISTANT = "{} at equidistant positions, which cut peaks off; its peak to peak: {}_peak_to_peak"
 STATIC_VARIABLES = {
@@ -1016,7 +1016,7 @@ def describe_static(data: xr.Dataset, run: Iterable[Finding] = ()) -> Block:
     k = "k: tangent stiffness dF/dx of teeth and bodies"
     notes = [sharing, f"{k}, held at their bores and at the outer surface of the ring"]
     if data.sizes.get("member", 0):
-        notes[1] = f"{k}; {SERIES}; the STE contains that and the motion of the members"
+        notes[1] = f"{k}, {SERIES}"
     if most > UNEQUAL and held == HELD:
         notes.append(
             "K_gamma with held centres: the teeth alone take up errors of pins, an upper bound; "
