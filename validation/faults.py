@@ -1,10 +1,11 @@
-"""Rows of faulty teeth: cracks by energy and one grid, none at all, faults together, characteristic frequencies."""
+"""Rows of faulty teeth: cracks by energy and one grid, none at all, faults together, wear, and frequencies."""
 
 from __future__ import annotations
 
 import math
 from dataclasses import replace
 from functools import cache
+from pathlib import Path
 
 import numpy as np
 from scipy.sparse import block_diag, coo_array, csc_array, csr_array
@@ -32,9 +33,12 @@ from femgear.gears.gear import Gear
 from femgear.gears.kinematics import speeds
 from femgear.gears.planetary import close_set, equal_planet_angles
 from femgear.stages.tooth_faults import fault_frequencies
+from femgear.study.wear import WearRequest, wear_of_case
+from femgear.trains.reading import read_case, with_values
 from validation.planetary import reference_set
 from validation.rows import Row, at_most, counted, printed, within
 
+CASES = Path(__file__).parents[1] / "cases"
 STEEL = Material(206e9, 0.3, 7850.0)
 ANGLE, DEPTHS, ELEMENTS = math.radians(70.0), (1.0e-3, 1.5e-3), 12
 STEP = 0.02
@@ -301,6 +305,36 @@ def over_one_another() -> tuple[Row, ...]:
         )
         for words, name in (("arc of the sun", "sun_arc"), ("loads of tooth pairs", "tooth_load"))
     )
+
+
+def wear_at_constant_load() -> tuple[Row, ...]:
+    """Wear of a pair at places where one tooth carries alone, however worn it is, beside Archard's law in closed form.
+
+    A point with the radius of curvature rho meets its mate once a turn and loses ``k F/b |1 - w' rho'/(w rho)|``, with
+    ``rho + rho'`` the length of the line of action between the base circles.
+    """
+    coarse = {"static.flank_elements": 4, "static.positions": 32, "static.stresses": False, "static.peaks": False}
+    case, rows = with_values(read_case(CASES / "spur_pair.toml"), coarse), list[Row]()
+    teeth, speed, hours, k = np.array([case.gear_1.teeth, case.gear_2.teeth]), case.operation.speeds[0], 400.0, 1e-18
+    base = 0.5 * case.module * teeth * math.cos(case.pressure_angle)
+    line = math.sqrt(case.set.centre_distance**2 - base.sum() ** 2)
+    pitch = 2.0 * math.pi * base[0] / teeth[0]
+    tip = [math.sqrt(tip_radius**2 - rb**2) for tip_radius, rb in zip((39.9e-3, 57.6893e-3), base, strict=True)]
+    # where no second pair touches, on the line of action from the base circle of gear 1
+    alone = tip[0] - pitch, line - tip[1] + pitch
+    for steps in (1, 4):
+        for place, flank in enumerate(wear_of_case(case, WearRequest(hours, k, steps)).flanks):
+            own = np.sqrt(flank.radius**2 - base[place] ** 2)
+            from_first = own if place == 0 else line - own
+            inside = np.flatnonzero((from_first > alone[0] + 0.1 * pitch) & (from_first < alone[1] - 0.1 * pitch))
+            for number in inside[[0, len(inside) // 2, -1]]:
+                ratio = (line - own[number]) / own[number] * teeth[place] / teeth[1 - place]
+                turns = speed * teeth[0] / teeth[place] / (2.0 * math.pi) * 3600.0 * hours
+                expected = k * case.operation.torque / base[0] / case.set.face_width * abs(1.0 - ratio) * turns
+                text = f"gear {place + 1}, diameter of {2e3 * flank.radius[number]:.2f} mm, steps {steps}: depth [um]"
+                source = "k F/b |1 - v'/v| times the passages, radii of curvature on the line of action"
+                rows.append(within("wear", source, text, 1e6 * expected, 1e6 * float(flank.depth[number]), 1e-6))
+    return tuple(rows)
 
 
 def frequencies() -> tuple[Row, ...]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 import sys
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -10,6 +11,7 @@ from typing import Annotated, Any, Literal
 
 from cyclopts import Parameter
 
+from femgear.commands.files import need_new_files, write_case_file
 from femgear.commands.program import Quantity, Tasks, Whole, app
 from femgear.commands.terminal import Progress, print_blocks, say
 from femgear.errors import CaseError
@@ -373,6 +375,58 @@ def relief(
         blocks, names = relief_into(data, output, request, cache=grid_cache(), progress=progress)
     print_blocks(blocks)
     say(f"files in {output}: {', '.join(names)}")
+    return 0
+
+
+@app.command(name="wear")
+def compute_wear(
+    case: Path,
+    /,
+    *,
+    hours: float,
+    coefficient: float,
+    output: Annotated[Path, Parameter(name=("--output", "-o"))],
+    steps: Whole = 4,
+    speed: Quantity | None = None,
+    force: Annotated[bool, Parameter(negative="")] = False,
+) -> int:
+    """Wear the loaded flanks by hours of running, in steps of which each has the loads of the flanks that are left.
+
+    Archard's law on the loads of the teeth. The case with the worn flanks is written, as faults of the kind wear, and
+    how half of the steps change the depths. As in: femgear wear set.toml --hours 1000 --coefficient 1e-18 -o worn.toml
+
+    Parameters
+    ----------
+    case
+        TOML case file of a planetary set, a pair, or a gearbox: of that the load case that it names first.
+    hours
+        Of running [h].
+    coefficient
+        Wear coefficient [m^2/N]: volume over load and sliding distance, 1e-18 to 1e-16 of lubricated steel.
+    output
+        Case file to write, in the folder of the case if that names other files.
+    steps
+        In which the hours are taken.
+    speed
+        Of the input, as "3000 rpm"; a gearbox has that of its load case. Default: the first of the case.
+    force
+        Replace the file.
+    """
+    from femgear.run import grid_cache
+    from femgear.study.wear import WearRequest, describe_wear, wear_of_case, worn_text
+    from femgear.trains.reading import read_case
+
+    need_new_files([output], force=force)
+    request = WearRequest(hours, coefficient, steps, speed)
+    data = read_case(case)
+    with Progress() as progress:
+        worn = wear_of_case(data, request, cache=grid_cache(), progress=progress)
+    print_blocks([describe_wear(worn, request)])
+    text, kept = worn_text(case, output, worn)
+    if not kept:
+        say("comments are left out: tables of the case stand within braces, or in files that the output has not")
+    write_case_file(text, output, force=force)
+    say(f"next:    femgear run {shlex.quote(str(output))}")
     return 0
 
 

@@ -235,6 +235,14 @@ def lead_separations(
     return lead, apart, every
 
 
+def slices_ahead(overlap: float, slices: int) -> np.ndarray:
+    """Find by how much slices (S,) run ahead of mid-width at an overlap ratio [periods], positive where +z comes first.
+
+    Of so many slices of helical teeth.
+    """
+    return overlap * ((np.arange(slices) + 0.5) / slices - 0.5)
+
+
 def over_slices(record, ahead: np.ndarray, *, periods: int = 1) -> dict[str, np.ndarray]:
     """Compute what a record of helical teeth has where every slice stands for the places around its middle.
 

@@ -18,6 +18,7 @@ from femgear.case.gear_set import materials_of
 from femgear.case.lubrication import LubricantSection, heat_missing, losses_wanted, oil_at
 from femgear.case.quantities import CELSIUS
 from femgear.case.tooth_friction import friction_coefficient, law_friction, shaft_turning
+from femgear.contact.face_width import slices_ahead
 from femgear.gears.contact_temperature import (
     SUPPLY,
     bulk_temperature_of_flash,
@@ -36,7 +37,6 @@ from femgear.gears.micropitting import film_thickness, oil_state
 from femgear.gears.profile import base_helix_angle
 from femgear.stages.heat_results import HeatResult, MeshHeat, describe_heat, heat_tables
 from femgear.stages.protocol import Stage, one_blas_thread
-from femgear.stages.static import slices_ahead
 
 if TYPE_CHECKING:
     from femgear.contact.mesh_cycle import MeshCycle

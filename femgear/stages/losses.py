@@ -24,6 +24,7 @@ from femgear.case.lubrication import (
     operating_viscosity,
 )
 from femgear.case.tooth_friction import friction_coefficient, shaft_turning
+from femgear.contact.face_width import slices_ahead
 from femgear.errors import CaseError
 from femgear.gears.friction import closed_loss_factor, loss_factor, sliding_per_path
 from femgear.gears.power_flow import pair_condition, planetary_condition
@@ -38,7 +39,7 @@ from femgear.stages.losses_results import (
 )
 from femgear.stages.planet_bearings import has_planet_friction, planet_friction
 from femgear.stages.protocol import Progress, Stage, one_blas_thread, silent
-from femgear.stages.static import slices_ahead, solve_static
+from femgear.stages.static import solve_static
 from femgear.system.bearing_friction import seal_torque
 
 if TYPE_CHECKING:

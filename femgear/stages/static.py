@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 import sys
+from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -49,6 +50,7 @@ from femgear.contact.bodies import (
 )
 from femgear.contact.cracked_flanks import cracked_flanks
 from femgear.contact.cycle import CycleOptions, cycle_without_load, walk_mesh_cycle
+from femgear.contact.face_width import slices_ahead
 from femgear.contact.mesh_cycle import MeshCycle
 from femgear.contact.root_stress import (
     RootStresses,
@@ -74,6 +76,7 @@ from femgear.fe.grid import Grid
 from femgear.gears.deviations import SetDeviations, common_period
 from femgear.gears.faults import Crack
 from femgear.gears.iso6336_root import root_face_width
+from femgear.gears.kinematics import speeds
 from femgear.gears.pair import GearSet
 from femgear.gears.planetary import PlanetarySet
 from femgear.gears.profile import base_helix_angle
@@ -87,6 +90,7 @@ from femgear.stages.static_results import (
     describe_stress,
 )
 from femgear.stages.strength import case_stresses
+from femgear.stages.wear import LoadedTeeth, speed_of_wear
 
 if TYPE_CHECKING:
     from femgear.case.teeth import GearCase
@@ -702,11 +706,6 @@ def _influences(case: Case, static: StaticResult, progress: Progress = silent) -
     return RootStresses(tuple(influences), ahead=ahead)
 
 
-def slices_ahead(overlap: float, slices: int) -> np.ndarray:
-    """Find by how much slices (S,) run ahead of mid-width at an overlap ratio, signed as `_overlap` [periods]."""
-    return overlap * ((np.arange(slices) + 0.5) / slices - 0.5)
-
-
 def _root_cycles(gears, influences, cycle: MeshCycle, ranges, reverse):
     """Find the root stress of every gear in every mesh, and the mesh period with which each begins."""
     if cycle.periods <= WHOLE_RECORD:
@@ -735,6 +734,24 @@ def _excerpt(cycle: MeshCycle, start: int, length: int) -> MeshCycle:
     values = {name: getattr(cycle, name) for name in names}
     parts = {name: value[..., take] for name, value in values.items() if value is not None}
     return replace(cycle, position=np.arange(len(take)) / each, periods=length, **parts)
+
+
+def loaded_set(
+    case: Any,
+    speed: float | None = None,
+    *,
+    cache: Path | None = None,
+    steps: Steps | None = None,
+    solve: Callable[..., StaticResult] = solve_static,
+) -> tuple[LoadedTeeth, ...]:
+    """Solve the contact of the teeth of a set, and find its mesh frequency at a speed of the input [rad/s].
+
+    ``cache`` is the folder of generated grids, ``steps`` are compliances of other cases, ``solve`` solves the contact.
+    CaseError: no speed (E-KEY-MISSING).
+    """
+    gears, operation, driven = planetary_set(case), case.operation, speed_of_wear(case, speed)
+    turning = speeds(gears, input=operation.input, fixed=operation.fixed, speed=driven)
+    return (LoadedTeeth("", solve(case, cache=cache, steps=steps), turning.mesh_frequency),)
 
 
 STATIC = Stage(

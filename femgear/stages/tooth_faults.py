@@ -7,16 +7,14 @@ from collections.abc import Iterator
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
 from femgear.case.fault_sections import keyed_faults
 from femgear.case.gear_set import planetary_set, set_deviations
-from femgear.contact.flank_pairs import RIGHT, acting_flanks, mesh_pairs
-from femgear.errors import CaseError
+from femgear.contact.flank_pairs import RIGHT, acting_flanks
 from femgear.findings import Finding
 from femgear.gears.faults import BrokenTip, Crack, MissingTooth, Spall, ToothFault
 from femgear.gears.pair import BRANCH
 from femgear.report.tables import Block, tabulate
+from femgear.stages.wear import POINTS, LoadedTeeth, wear_entries, worn_flanks
 
 if TYPE_CHECKING:
     from femgear.gears.pair import GearSet
@@ -136,19 +134,18 @@ def undrawn_faults(case: Any) -> Iterator[str]:
 
 
 def archard_wear(
-    case: Any, static: Any, *, hours: float, coefficient: float, mesh_frequency: float, points: int = 41
+    case: Any, static: Any, *, hours: float, coefficient: float, mesh_frequency: float, points: int = POINTS
 ) -> dict[str, list[dict[str, object]]]:
     """Compute what the loaded flanks of all gears lose in some hours by Archard's law, as entries of the case.
 
-    Under a contact that passes with the pressure p a point of a flank slides over s, the width of the contact times
-    ``|1 - v_2/v_1|`` of the rolling speeds, and loses ``k p s``: of the mean pressure ``k (F/b) |1 - v_2/v_1|``,
-    whatever the width is (A. Flodin, S. Andersson, Wear 207, 1997, 16-23). Loads are those of the flanks that the case
-    has: many hours are taken in steps, each with the entries of the one before.
+    Loads are those of the flanks that the case has: many hours are taken in steps, each with the entries of the one
+    before, as `femgear.study.wear` and the command ``femgear wear`` do. The law is that of
+    `femgear.stages.wear.worn_flanks`.
 
     Parameters
     ----------
     case : Case or PairCase
-        A set or a pair under a positive torque.
+        A set or a pair under a torque.
     static : StaticResult
         Its contact, from `femgear.stages.static.solve_static`.
     hours : float
@@ -168,33 +165,7 @@ def archard_wear(
     Raises
     ------
     CaseError
-        E-TORQUE: a torque that is not positive.
+        E-NO-LOAD: no torque.
     """
-    gears, cycle = static.planetary_set, static.cycle
-    if not static.sun_torque > 0.0:
-        raise CaseError("wear is that of a positive torque", code="E-TORQUE", key="operation.torque", limit="above 0")
-    lost: dict[str, list[dict[str, object]]] = {}
-    passages = {name: 3600.0 * hours * often for name, often in fault_frequencies(gears, mesh_frequency).items()}
-    sides = {(mesh, place): side for _, acting in acting_flanks(gears) for mesh, place, side in acting}
-    for mesh, (kind, width) in enumerate(zip(gears.mesh_kind.tolist(), np.array(gears.mesh_widths)[gears.mesh_kind])):
-        pair = mesh_pairs(gears)[kind]
-        zeta = np.linspace(pair.path[0], pair.path[1], points)
-        path, load = cycle.path[mesh].ravel(), cycle.tooth_load[mesh].ravel()
-        order = np.argsort(path[load > 0.0])
-        force = np.interp(zeta, path[load > 0.0][order], load[load > 0.0][order])
-        rolls = [pair.roll_on(place, zeta) for place in (0, 1)]
-        speed = [rolls[0] / pair.base_radius_1, rolls[1] / pair.base_radius_2]
-        for place, number in enumerate(gears.bodies[body].gear for body in gears.meshes[mesh].bodies):
-            gear, copy = gears.gears[number], gears.meshes[mesh].copy
-            if not gears.repeated[number] and copy > 0:
-                continue
-            depth = coefficient * force / width * np.abs(1.0 - speed[1 - place] / speed[place]) * passages[gear.name]
-            radius = np.hypot(gear.base_radius, rolls[place])
-            rising = np.argsort(radius)
-            words = ("sun side", "ring side") if gear.name == "planet" else ("left", "right")
-            fault: dict[str, object] = {"kind": "wear", "flank": words[sides[mesh, place]]}
-            fault |= {"planet": copy + 1} if gear.name == "planet" else {}
-            fault |= {"diameters": [f"{2e3 * radius[i]:.9g} mm" for i in rising]}
-            fault |= {"depths": [f"{1e6 * depth[i]:.6g} um" for i in rising]}
-            lost.setdefault(f"{gear.name}.fault", []).append(fault)
-    return lost
+    teeth = LoadedTeeth("", static, mesh_frequency)
+    return wear_entries(worn_flanks(teeth, hours=hours, coefficient=coefficient, points=points))

@@ -124,8 +124,8 @@ def test_wear_by_archard_is_load_over_width_times_sliding_times_passages(healthy
     expected = 1e-17 * force / 25e-3 * sliding * 3600 * 100 * 3 * 360 / 27
     assert fault.removed(rolls[0]) == pytest.approx(expected, rel=0.05)
     assert fault.removed(pair.pitch_roll_1) < 0.1 * fault.removed(rolls[0]) or sliding < 0.02
-    with pytest.raises(CaseError, match="positive torque"):
-        archard_wear(coarse, replace(static, sun_torque=-1.0), **given)
+    with pytest.raises(CaseError, match="without torque"):
+        archard_wear(coarse, replace(static, sun_torque=0.0), **given)
 
 
 def test_a_gearbox_says_what_faults_leave_out_and_refuses_them_without_contact():

@@ -85,6 +85,7 @@ from femgear.stages.static import (
     foundation_entries,
     gear_entries,
     loaded_over_width,
+    loaded_set,
     record_positions,
     ring_foundation,
     solve_static,
@@ -846,6 +847,7 @@ _FORMATS = {"wav": ("housing",), "uff": ("housing", "modes"), "quality": ("housi
 ELASTIC = Train(
     name="elastic",
     words="a case with an elastic ring",
+    loaded_teeth=loaded_set,
     stages=(
         STATIC,
         STRESS,

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -50,6 +51,7 @@ from femgear.stages.static import (
     STATIC,
     STRESS,
     frictionless_cycle,
+    loaded_set,
     mesh_backlash,
     solve_static,
     solve_stress,
@@ -308,6 +310,7 @@ def _dynamic_model(case: HelicalCase, results: Mapping[str, Any]) -> DynamicMode
 HELICAL = Train(
     name="helical",
     words="a helical case",
+    loaded_teeth=partial(loaded_set, solve=solve_helical_static),
     stages=(
         replace(
             STATIC,

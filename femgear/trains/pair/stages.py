@@ -63,7 +63,7 @@ from femgear.stages.protocol import (
     one_blas_thread,
     silent,
 )
-from femgear.stages.static import LARGEST_APPROACH, STATIC, STRESS
+from femgear.stages.static import LARGEST_APPROACH, STATIC, STRESS, solve_static
 from femgear.stages.static_figures import FIGURES
 from femgear.stages.static_results import (
     StaticResult,
@@ -79,6 +79,7 @@ from femgear.stages.strength_results import strength_verdict
 from femgear.stages.tooth_faults import describe_faults
 from femgear.stages.tooth_figures import pair_key_figures
 from femgear.stages.train_judgements import set_judgements
+from femgear.stages.wear import LoadedTeeth, speed_of_wear
 from femgear.system.force_laws import GearMeshes
 from femgear.system.fourier import fluctuation, sample
 from femgear.system.system import Modes, NonlinearSystem, Response, source_harmonics
@@ -104,8 +105,11 @@ from femgear.trains.pair.results import (
 )
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
     import xarray as xr
 
+    from femgear.case.dependencies import Steps
     from femgear.exchange.dynamic_model import DynamicModel
     from femgear.storage.results import Results
 
@@ -452,9 +456,21 @@ def _dynamic_model(case: PairCase, results: Mapping[str, Any]) -> DynamicModel:
     return pair_dynamic_model(case, modes.gears, modes.model, modes.modes, modes.excitation)
 
 
+def loaded_pair(
+    case: PairCase, speed: float | None = None, *, cache: Path | None = None, steps: Steps | None = None
+) -> tuple[LoadedTeeth, ...]:
+    """Solve the contact of the teeth of a pair, and find its mesh frequency at a speed of gear 1 [rad/s].
+
+    CaseError: no speed (E-KEY-MISSING).
+    """
+    frequency = speed_of_wear(case, speed) * case.gear_1.teeth / (2.0 * math.pi)
+    return (LoadedTeeth("", solve_static(case, cache=cache, steps=steps), abs(frequency)),)
+
+
 PAIR = Train(
     name="pair",
     words="a pair",
+    loaded_teeth=loaded_pair,
     stages=(
         replace(STATIC, describe=_describe_static),
         STRESS,
