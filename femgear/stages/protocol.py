@@ -34,7 +34,7 @@ if TYPE_CHECKING:
     from femgear.measured.heard_set import HeardSet
     from femgear.report.space import SpaceBody
     from femgear.stages.key_figures import KeyFigure
-    from femgear.stages.wear import LoadedTeeth
+    from femgear.stages.wear import MeshingTeeth
     from femgear.storage.results import Results
 
 Progress = Callable[[str, float, float], None]
@@ -365,8 +365,8 @@ class Train:
         ``(case) -> sentence`` that says what the train does, empty of trains without a power flow.
     check_model : callable
         ``(case)``: refuses a case that has no model for other programs (E-MODEL), before anything is computed for it.
-    loaded_teeth : callable, optional
-        ``(case, speed of the input or None, cache=, steps=) -> LoadedTeeth`` of all stages, from which flanks wear;
+    meshing_teeth : callable, optional
+        ``(case, speed of the input or None, cache=, steps=) -> MeshingTeeth`` of all stages, from which flanks wear;
         None of trains that solve no contact of teeth.
     """
 
@@ -390,7 +390,7 @@ class Train:
     stands_in: Mapping[str, str] = field(default_factory=dict)
     duty: Callable[[Any], str] = lambda case: ""
     check_model: Callable[[Any], None] = lambda case: None
-    loaded_teeth: Callable[..., Sequence[LoadedTeeth]] | None = None
+    meshing_teeth: Callable[..., Sequence[MeshingTeeth]] | None = None
 
     def stage(self, name: str) -> Stage | None:
         """Find the stage of a name, None where the train has none of it."""

@@ -90,7 +90,7 @@ from femgear.stages.static_results import (
     describe_stress,
 )
 from femgear.stages.strength import case_stresses
-from femgear.stages.wear import LoadedTeeth, speed_of_wear
+from femgear.stages.wear import MeshingTeeth, speed_of_wear
 
 if TYPE_CHECKING:
     from femgear.case.teeth import GearCase
@@ -743,7 +743,7 @@ def loaded_set(
     cache: Path | None = None,
     steps: Steps | None = None,
     solve: Callable[..., StaticResult] = solve_static,
-) -> tuple[LoadedTeeth, ...]:
+) -> tuple[MeshingTeeth, ...]:
     """Solve the contact of the teeth of a set, and find its mesh frequency at a speed of the input [rad/s].
 
     ``cache`` is the folder of generated grids, ``steps`` are compliances of other cases, ``solve`` solves the contact.
@@ -751,7 +751,7 @@ def loaded_set(
     """
     gears, operation, driven = planetary_set(case), case.operation, speed_of_wear(case, speed)
     turning = speeds(gears, input=operation.input, fixed=operation.fixed, speed=driven)
-    return (LoadedTeeth("", solve(case, cache=cache, steps=steps), turning.mesh_frequency),)
+    return (MeshingTeeth("", solve(case, cache=cache, steps=steps), turning.mesh_frequency),)
 
 
 STATIC = Stage(

@@ -14,7 +14,7 @@ from femgear.findings import Finding
 from femgear.gears.faults import BrokenTip, Crack, MissingTooth, Spall, ToothFault
 from femgear.gears.pair import BRANCH
 from femgear.report.tables import Block, tabulate
-from femgear.stages.wear import POINTS, LoadedTeeth, wear_entries, worn_flanks
+from femgear.stages.wear import POINTS, MeshingTeeth, wear_entries, worn_flanks
 
 if TYPE_CHECKING:
     from femgear.gears.pair import GearSet
@@ -167,5 +167,5 @@ def archard_wear(
     CaseError
         E-NO-LOAD: no torque.
     """
-    teeth = LoadedTeeth("", static, mesh_frequency)
+    teeth = MeshingTeeth("", static, mesh_frequency)
     return wear_entries(worn_flanks(teeth, hours=hours, coefficient=coefficient, points=points))

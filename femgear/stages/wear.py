@@ -1,6 +1,6 @@
 """Wear of loaded flanks by Archard's law: what a contact under load takes off every flank that carries.
 
-Loads come as `LoadedTeeth`, which every kind of case makes of its own contact. What they take off over some hours is a
+Loads come as `MeshingTeeth`, which every kind of case makes of its own contact. What they take off over some hours is a
 `WornFlank` a flank, with its entry of the case file.
 """
 
@@ -8,16 +8,13 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from femgear.contact.face_width import slices_ahead
 from femgear.contact.flank_pairs import RIGHT, FlankPair, acting_flanks, mesh_pairs
 from femgear.errors import CaseError
-
-if TYPE_CHECKING:
-    from femgear.stages.static_results import StaticResult
 
 POINTS = 41
 """Points of the curve of a flank."""
@@ -26,7 +23,7 @@ _SAME_PATH = 1e-9
 
 
 @dataclass(frozen=True)
-class LoadedTeeth:
+class MeshingTeeth:
     """Contact of teeth under load, and how often they mesh.
 
     Parameters
@@ -35,13 +32,13 @@ class LoadedTeeth:
         What stands before the names of the gears in keys of the case, as "pair[0].teeth."; empty of cases that are
         their own teeth.
     static : StaticResult
-        Their contact, of either sign of the torque.
+        Their contact (`femgear.stages.static_results`), of either sign of the torque.
     mesh_frequency : float
         [Hz]
     """
 
     prefix: str
-    static: StaticResult
+    static: Any
     mesh_frequency: float
 
 
@@ -81,7 +78,7 @@ class WornFlank:
         return {"kind": "wear", "flank": self.flank, **planet, "diameters": diameters, "depths": depths}
 
 
-def worn_flanks(teeth: LoadedTeeth, *, hours: float, coefficient: float, points: int = POINTS) -> list[WornFlank]:
+def worn_flanks(teeth: MeshingTeeth, *, hours: float, coefficient: float, points: int = POINTS) -> list[WornFlank]:
     """Compute what all loaded flanks lose in some hours under the loads that they have.
 
     Under a contact that passes with the pressure p a point of a flank slides over s, the width of the contact times
@@ -91,7 +88,7 @@ def worn_flanks(teeth: LoadedTeeth, *, hours: float, coefficient: float, points:
 
     Parameters
     ----------
-    teeth : LoadedTeeth
+    teeth : MeshingTeeth
         Contact and mesh frequency.
     hours : float
         Of running [h].
@@ -143,7 +140,7 @@ def specific_sliding(pair: FlankPair, rolls: list[np.ndarray], place: int) -> np
     return np.abs(1.0 - speed[1 - place] / speed[place])
 
 
-def _mean_load(static: StaticResult, mesh: int, zeta: np.ndarray) -> np.ndarray:
+def _mean_load(static: Any, mesh: int, zeta: np.ndarray) -> np.ndarray:
     """Mean load (n,) [N] of a tooth pair of a mesh at places (n,) of its path, over mesh periods and slices."""
     cycle, gears = static.cycle, static.planetary_set
     # flanks that a negative torque presses are those of the mirror image, whose path runs the other way

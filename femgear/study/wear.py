@@ -19,7 +19,7 @@ from femgear.case.quantities import SPEED, to_si
 from femgear.errors import CaseError
 from femgear.report.tables import Block, tabulate
 from femgear.stages.protocol import Progress, one_blas_thread, silent
-from femgear.stages.wear import LoadedTeeth, WornFlank, wear_entries, with_more_wear, worn_flanks
+from femgear.stages.wear import MeshingTeeth, WornFlank, wear_entries, with_more_wear, worn_flanks
 from femgear.study.faults import all_faults
 from femgear.trains.reading import parse_case, to_toml, with_values
 from femgear.trains.registry import check_case, train_of
@@ -94,10 +94,10 @@ def wear_of_case(
     halves = request.steps // 2
     steps, done, total = Steps(), 0, request.steps + max(halves - 1, 0)
 
-    def contact(worn: Any) -> Sequence[LoadedTeeth]:
+    def contact(worn: Any) -> Sequence[MeshingTeeth]:
         nonlocal done
         progress("wear", done, total)
-        teeth = train_of(worn).loaded_teeth(worn, speed, cache=cache, steps=steps)
+        teeth = train_of(worn).meshing_teeth(worn, speed, cache=cache, steps=steps)
         done += 1
         progress("wear", done, total)
         return teeth
@@ -109,7 +109,7 @@ def wear_of_case(
     return WornCase(worn, tuple(flanks.values()), tuple(half.values()))
 
 
-def _worn(case: Any, request: WearRequest, count: int, first: Sequence[LoadedTeeth], contact: Any) -> _Flanks:
+def _worn(case: Any, request: WearRequest, count: int, first: Sequence[MeshingTeeth], contact: Any) -> _Flanks:
     """Take the hours in so many steps, from the contact of the case as it is; none without steps."""
     flanks: _Flanks = {}
     for step in range(count):
@@ -126,7 +126,7 @@ def _checked(case: Any, request: WearRequest) -> float | None:
     speed = None
     with all_faults() as part:
         with part():
-            if train_of(case).loaded_teeth is None:
+            if train_of(case).meshing_teeth is None:
                 message = f"{train_of(case).words} has no contact of its teeth under load, so nothing wears"
                 limit = "planetary sets, pairs and gearboxes whose teeth are given"
                 raise CaseError(message, code="E-MODEL", key="model", limit=limit, remedy="femgear gearbox CASE")

@@ -7,7 +7,7 @@ import pytest
 
 from femgear.errors import CaseError
 from femgear.stages.static import loaded_set
-from femgear.stages.wear import LoadedTeeth, speed_of_wear, wear_entries, with_more_wear, worn_flanks
+from femgear.stages.wear import MeshingTeeth, speed_of_wear, wear_entries, with_more_wear, worn_flanks
 from femgear.trains.pair.stages import loaded_pair
 from femgear.trains.reading import read_case, with_values
 
@@ -96,7 +96,7 @@ def test_without_torque_or_speed_nothing_wears(pair):
 
 def test_slices_wear_by_their_mean_load(pair, whole):
     (teeth,) = loaded_pair(with_values(pair, {"static.slices": 5}), 100.0)
-    assert isinstance(teeth, LoadedTeeth) and teeth.prefix == ""
+    assert isinstance(teeth, MeshingTeeth) and teeth.prefix == ""
     for flank, sliced in zip(whole, worn_flanks(teeth, **GIVEN), strict=True):
         assert sliced.depth == pytest.approx(flank.depth, abs=0.02 * flank.depth.max())
 

@@ -847,7 +847,7 @@ _FORMATS = {"wav": ("housing",), "uff": ("housing", "modes"), "quality": ("housi
 ELASTIC = Train(
     name="elastic",
     words="a case with an elastic ring",
-    loaded_teeth=loaded_set,
+    meshing_teeth=loaded_set,
     stages=(
         STATIC,
         STRESS,

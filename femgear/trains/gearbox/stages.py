@@ -17,7 +17,7 @@ from femgear.report.tables import Block, merged_names, tabulate
 from femgear.stages.drawing_tables import describe_drawing
 from femgear.stages.duty import ShaftEnd, duty_sentence
 from femgear.stages.protocol import FiguresOf, Progress, Stage, Train, modes_verdict, one_blas_thread, silent
-from femgear.stages.wear import LoadedTeeth
+from femgear.stages.wear import MeshingTeeth
 from femgear.trains.gearbox.balance import (
     GearboxBalanceResult,
     balance_tables,
@@ -251,7 +251,7 @@ def _response_verdict(result: GearboxResponseResult) -> dict:
 
 def loaded_stages(
     case: GearboxCase, speed: float | None = None, *, cache: Path | None = None, steps: Steps | None = None
-) -> tuple[LoadedTeeth, ...]:
+) -> tuple[MeshingTeeth, ...]:
     """Solve the contact of the teeth of all stages that carry, under the load case that the case names first.
 
     CaseError: a speed beside that of the load case (E-ARGUMENTS); no stage whose contact is solved (E-FAULT).
@@ -260,12 +260,12 @@ def loaded_stages(
         message, remedy = "a gearbox has the speeds of its load case", "leave it out, or change operation.load_case"
         raise CaseError(message, code="E-ARGUMENTS", key="--speed", remedy=remedy)
     state = solve_deflection(case, steps=steps)
-    flow, loaded = state.model.flow, list[LoadedTeeth]()
+    flow, loaded = state.model.flow, list[MeshingTeeth]()
     for kind in ("pair", "planetary"):
         for number, section in enumerate(getattr(case, kind)):
             if (contact := state.contacts.get(section.name)) is not None:
                 prefix, frequency = f"{kind}[{number}].teeth.", abs(flow.mesh_frequency[section.name])
-                loaded.append(LoadedTeeth(prefix, contact.result, frequency))
+                loaded.append(MeshingTeeth(prefix, contact.result, frequency))
     if not loaded:
         message, remedy = "no stage has teeth whose contact is solved", "give teeth to a stage that carries load"
         remedies = (remedy, "leave deflection.contact out")
@@ -276,7 +276,7 @@ def loaded_stages(
 GEARBOX = Train(
     name="gearbox",
     words="a gearbox case",
-    loaded_teeth=loaded_stages,
+    meshing_teeth=loaded_stages,
     stages=(
         Stage(
             name="deflection",

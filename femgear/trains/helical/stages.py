@@ -310,7 +310,7 @@ def _dynamic_model(case: HelicalCase, results: Mapping[str, Any]) -> DynamicMode
 HELICAL = Train(
     name="helical",
     words="a helical case",
-    loaded_teeth=partial(loaded_set, solve=solve_helical_static),
+    meshing_teeth=partial(loaded_set, solve=solve_helical_static),
     stages=(
         replace(
             STATIC,

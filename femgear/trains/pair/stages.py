@@ -79,7 +79,7 @@ from femgear.stages.strength_results import strength_verdict
 from femgear.stages.tooth_faults import describe_faults
 from femgear.stages.tooth_figures import pair_key_figures
 from femgear.stages.train_judgements import set_judgements
-from femgear.stages.wear import LoadedTeeth, speed_of_wear
+from femgear.stages.wear import MeshingTeeth, speed_of_wear
 from femgear.system.force_laws import GearMeshes
 from femgear.system.fourier import fluctuation, sample
 from femgear.system.system import Modes, NonlinearSystem, Response, source_harmonics
@@ -458,19 +458,19 @@ def _dynamic_model(case: PairCase, results: Mapping[str, Any]) -> DynamicModel:
 
 def loaded_pair(
     case: PairCase, speed: float | None = None, *, cache: Path | None = None, steps: Steps | None = None
-) -> tuple[LoadedTeeth, ...]:
+) -> tuple[MeshingTeeth, ...]:
     """Solve the contact of the teeth of a pair, and find its mesh frequency at a speed of gear 1 [rad/s].
 
     CaseError: no speed (E-KEY-MISSING).
     """
     frequency = speed_of_wear(case, speed) * case.gear_1.teeth / (2.0 * math.pi)
-    return (LoadedTeeth("", solve_static(case, cache=cache, steps=steps), abs(frequency)),)
+    return (MeshingTeeth("", solve_static(case, cache=cache, steps=steps), abs(frequency)),)
 
 
 PAIR = Train(
     name="pair",
     words="a pair",
-    loaded_teeth=loaded_pair,
+    meshing_teeth=loaded_pair,
     stages=(
         replace(STATIC, describe=_describe_static),
         STRESS,
