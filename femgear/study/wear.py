@@ -185,8 +185,9 @@ def worn_text(path: Path, output: Path, worn: WornCase) -> tuple[str, bool]:
 def _with_tables(text: str, key: str, added: Sequence[Mapping[str, object]]) -> str:
     """Put tables of a list behind all that a file has of the table above it, or of the member of a list above it."""
     lines, above = text.rstrip("\n").split("\n"), key.partition(".")[0]
-    headers = [(found, line) for found, line in case_text.keys_with_lines(text) if lines[line - 1].lstrip()[:1] == "["]
-    inside = [line for found, line in headers if found == above or found.startswith((f"{above}.", f"{above}["))]
+    numbered = case_text.keys_with_lines(text)
+    headers = [(header, line) for header, line in numbered if lines[line - 1].lstrip()[:1] == "["]
+    inside = [line for header, line in headers if header == above or header.startswith((f"{above}.", f"{above}["))]
     after = [line for _, line in headers if inside and line > max(inside)]
     end = min(after, default=len(lines) + 1) - 1
     # comments right above the next table belong to that
