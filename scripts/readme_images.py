@@ -21,7 +21,7 @@ LARGEST, WIDEST, COLOURS = 110_000, 960, 40
 HEAD = """# Gallery
 
 Pictures of every case and script, with the command that makes them. Made by
-`scripts/readme_images.py docs`; what two commands make alike stands where the first one is.
+`scripts/readme_images.py docs`; pictures that two commands make alike stand with the first command.
 """
 
 
@@ -191,7 +191,7 @@ RUNS = {
         "load_sharing.py",
         "Load sharing",
         load_sharing="Shares of the planets where one of them has a gap, and the load sharing factor.",
-        tooth_loads="Load of the tooth pairs of that planet and of its neighbour along the path of contact.",
+        tooth_loads="Load of the tooth pairs of the planet with the gap and of its neighbour, along the path.",
     ),
     "harris_map": Run(
         "femgear harris cases/planetary_27_40_108.toml",
@@ -284,7 +284,7 @@ RUNS = {
         contact_states="Contact states by harmonic balance and by sweeps in time.",
         chaos="Deflection once a period and the largest Lyapunov exponent: chaos where it is positive.",
         sections="Stroboscopic sections at three ratios.",
-        eccentricity="Mesh force of a set with an eccentric sun: one that floats keeps the teeth in contact.",
+        eccentricity="Mesh force of a set with an eccentric sun: a floating sun keeps the teeth in contact.",
         sun_path="Path of the sun's centre, held and floating.",
         spectrum="Lines of the mesh force: side bands of the sun's turn about every mesh harmonic.",
     ),

@@ -91,7 +91,7 @@ class Step:
 
 
 def factor(H):
-    """Lower Cholesky factor of a symmetric matrix (its strict upper triangle is not used).
+    """Compute the lower Cholesky factor (n, n) of a symmetric matrix (n, n), whose strict upper triangle is not used.
 
     ContactError: E-CONTACT-COMPLIANCE when the matrix is not positive definite.
     """

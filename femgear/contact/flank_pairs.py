@@ -113,8 +113,8 @@ def flank_pair(gear_1: Gear, gear_2: Gear, centre_distance: float, pressure_angl
 def separation(pair: FlankPair, zeta, roll_1):
     """Compute the separation of flank 1 from flank 2 and the roll length of the foot point on flank 2.
 
-    From arrays that broadcast: path coordinates of the tooth pair and roll lengths on flank 1, all in m. The
-    separation is along the normal of flank 2.
+    From arrays (...) that broadcast: path coordinates ``zeta`` of the tooth pair and roll lengths ``roll_1`` on flank
+    1, all in m. The separation is along the normal of flank 2.
     """
     rb1, rb2, sign = pair.base_radius_1, pair.base_radius_2, pair.sign
     # polar angle of an involute point: origin angle less the involute function of its pressure angle

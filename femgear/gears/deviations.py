@@ -225,7 +225,7 @@ def profile_separation(
 ):
     """Compute the separation [m] of two flanks by their modifications, of the shape of both roll lengths [m].
 
-    The roll lengths of the facing points on gear 1 and gear 2 broadcast; ``kind`` is 0 for sun-planet (gear 1
+    The roll lengths (...) [m] of the facing points on gear 1 and gear 2 broadcast; ``kind`` is 0 for sun-planet (gear 1
     is the sun), 1 for planet-ring (gear 1 is the planet). With ``back`` the other flanks of the teeth; those
     of a planet are its ring side in the mesh with the sun.
     """
@@ -283,7 +283,7 @@ def misaligned_approach(d: SetDeviations, s: GearSet, *, back: bool = False) -> 
 def tooth_separation(deviations: SetDeviations, mesh: int, tooth_1, tooth_2, *, back: bool = False):
     """Compute the separation [m] of the loaded flanks of teeth by pitch deviations, of the teeth's shape.
 
-    The numbers of the teeth on gear 1 and gear 2 broadcast, and are taken modulo the tooth numbers; the mesh
+    The numbers (...) of the teeth on gear 1 and gear 2 broadcast, and are taken modulo the tooth numbers; the mesh
     is 0 .. N-1 for sun-planet, N .. 2N-1 for planet-ring. With ``back`` the other flanks of the teeth: a
     tooth of sun or ring moves as a whole.
     """

@@ -224,7 +224,7 @@ def half_thickness_angle(gear: Gear, radius):
 
 
 def tooth_thickness(gear: Gear, radius):
-    """Compute the arc [m] of the tooth at a radius [m] (float or array), ``2 r eta(r)``."""
+    """Compute the arc (...) [m] of the tooth at radii (...) [m], ``2 r eta(r)``."""
     return 2.0 * radius * half_thickness_angle(gear, radius)
 
 

@@ -189,7 +189,7 @@ def single_pair_factors(
 def relative_curvature(gear_1: Gear, gear_2: Gear, *, working_angle: float, path):
     """Compute the sum of the curvatures of two flanks in contact [1/m], that of an internal gear negative.
 
-    At path coordinates [m] (float or array), 0 at the pitch point and positive outwards on gear 1; the
+    At path coordinates (...) [m], 0 at the pitch point and positive outwards on gear 1; the
     working pressure angle in rad. Infinite where a flank begins at its base circle.
     """
     roll_1 = np.maximum(gear_1.base_radius * math.tan(working_angle) + path, 0.0)

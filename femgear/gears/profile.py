@@ -106,7 +106,7 @@ def pressure_angle_at(radius, base_radius: float) -> Any:
 def roll(radius, base_radius: float) -> Any:
     """Compute the roll length ``sqrt(r^2 - rb^2)`` [m] from the base tangent point to the flank point.
 
-    At a radius [m], float or array, of the base radius [m] or more.
+    At radii (...) [m] of the base radius [m] or more.
     """
     r = np.asarray(radius, dtype=float)
     return _plain(np.sqrt(np.maximum((r - base_radius) * (r + base_radius), 0.0)))

@@ -172,7 +172,7 @@ class LineVerdict:
 
 
 def spacing_symmetry(planet_angles) -> int:
-    """Find the largest g for which turns by ``2 pi/g`` map the planet angles [rad] on one another."""
+    """Find the largest g for which turns by ``2 pi/g`` map the planet angles (N,) [rad] on one another."""
     place = np.exp(1j * np.asarray(planet_angles, float))
     turned = (place[:, None] * np.exp(2j * np.pi / g) - place for g in range(len(place), 0, -1))
     return next(len(place) - i for i, difference in enumerate(turned) if np.abs(difference).min(axis=1).max() < 1e-5)

@@ -328,19 +328,28 @@ def a_weighting(frequency) -> np.ndarray:
 
 
 def pressure_level(pressure, frequency) -> np.ndarray:
-    """Compute the A-weighted sound pressure level [dB re 20 uPa] of lines (..., n_orders) [Pa, peak]."""
+    """Compute A-weighted sound pressure levels (...) [dB re 20 uPa] of lines (..., n_orders) [Pa, peak].
+
+    The lines are at ``frequency`` (..., n_orders) [Hz].
+    """
     weighted = np.abs(pressure) * a_weighting(frequency)
     return _decibels((weighted**2).sum(axis=-1) / 2, REFERENCE_PRESSURE**2)
 
 
 def acceleration_level(acceleration, frequency) -> np.ndarray:
-    """Compute the A-weighted level [dB re 1 um/s^2] of lines (..., n_orders) of the acceleration [m/s^2, peak]."""
+    """Compute A-weighted levels (...) [dB re 1 um/s^2] of lines (..., n_orders) of the acceleration [m/s^2, peak].
+
+    The lines are at ``frequency`` (..., n_orders) [Hz].
+    """
     weighted = np.abs(acceleration) * a_weighting(frequency)
     return _decibels((weighted**2).sum(axis=-1) / 2, REFERENCE_ACCELERATION**2)
 
 
 def power_level(power, frequency) -> np.ndarray:
-    """Compute the A-weighted sound power level [dB re 1 pW] of the power of lines (..., n_orders) [W]."""
+    """Compute A-weighted sound power levels (...) [dB re 1 pW] of the power of lines (..., n_orders) [W].
+
+    The lines are at ``frequency`` (..., n_orders) [Hz].
+    """
     return _decibels((power * a_weighting(frequency) ** 2).sum(axis=-1), REFERENCE_POWER)
 
 

@@ -76,13 +76,13 @@ MODE_CAPTIONS = {
 RESPONSE_CAPTIONS = {
     "dynamic_transmission_error": (
         "Dynamic transmission error over one mesh period beside the static one of the set on its supports, "
-        "both without their mean: what the dynamic curve has more is vibration. The static curve has the "
-        "harmonics of the excitation alone: what rings in both is the cut series. With errors that turn, "
-        "over all mesh periods until these repeat."
+        "both without their mean: their difference is vibration. The static curve has the harmonics of the "
+        "excitation alone; ripples in both come from the cut series. With errors that turn, over all mesh "
+        "periods until these repeat."
     ),
     "mesh_forces": (
-        "Mesh forces over one mesh period, and the dynamic factor K_v, largest over mean force: that of the "
-        "mesh of a kind where it is the largest. With errors that turn, over all mesh periods until these "
+        "Mesh forces over one mesh period, and the dynamic factor K_v, largest over mean force, of the "
+        "worst mesh of each kind. With errors that turn, over all mesh periods until these "
         "repeat."
     ),
     "dynamic_spectrum": (
@@ -131,7 +131,7 @@ def mode_shapes(
 
 
 def frequency_groups(frequency) -> list[tuple[int, ...]]:
-    """Group the numbers of modes of equal natural frequency, ascending [Hz], to a millionth."""
+    """Group the numbers of modes of equal natural frequency (m,) [Hz], ascending, to a millionth."""
     starts = np.flatnonzero(np.diff(frequency) > 1e-6 * frequency[1:]) + 1
     return [tuple(group.tolist()) for group in np.split(np.arange(len(frequency)), starts)]
 
@@ -210,8 +210,8 @@ def _ring_motion(modes, mode):
 def campbell(speed, frequency, *, orders, order_names, critical, speed_unit: str) -> Figure:
     """Draw natural frequencies over the speed with lines of excitation: a Campbell diagram.
 
-    Frequencies (p, m) [Hz] at speeds (p,) in ``speed_unit``; orders (k,) are slopes of the lines [Hz per unit
-    of speed]; ``critical`` are intersections to mark, pairs of speed and frequency [Hz].
+    Frequencies (p, m) [Hz] at speeds (p,) in ``speed_unit``; ``orders`` (k,), by ``order_names``, are slopes of the
+    lines [Hz per unit of speed]; ``critical`` are intersections to mark, pairs of speed and frequency [Hz].
     """
     figure, (ax,) = new_figure(height=5.4)
     for branch in np.transpose(frequency):

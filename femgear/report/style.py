@@ -177,7 +177,8 @@ def name_curves(ax, *, at: float = 0.985) -> None:
 def stems(ax, x, amplitude, floor: float, *, text: str, colour: str = BLUE, width: float = 1.0) -> None:
     """Draw the lines of a spectrum that are higher than `floor`, from there.
 
-    Of more lines than there are pixels, the highest one of every column is drawn.
+    They have the places ``x`` (n,) and the heights ``amplitude`` (n,). Of more lines than there are pixels, the highest
+    one of every column is drawn.
     """
     x, amplitude = np.asarray(x), np.asarray(amplitude)
     shown = _highest(x, amplitude, amplitude > floor)

@@ -844,7 +844,7 @@ _STRESSES = Figures(
             "6336-3, where the tangent stands at 30° (internal gears 60°) to the centreline of the tooth."
         ),
         "planet_bending": (
-            "Roots of a planet's tooth while the planet turns once against the carrier: the sun bends it "
+            "Stress in the roots of a planet's tooth while the planet turns once against the carrier: the sun bends it "
             "one way, the ring the other."
         ),
     },

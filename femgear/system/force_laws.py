@@ -165,7 +165,8 @@ class GearMeshes:
     def flank_forces(self, x, theta):
         """Compute stiffness [N/m], forces of drive and back flanks (..., g) [N], and which have a back side.
 
-        Drive flanks are closed where their force is positive, back flanks where theirs is negative.
+        From deflections ``x`` (..., g, 1) [m] at the phases ``theta`` (..., n_bases) [rad]. Drive flanks are closed
+        where their force is positive, back flanks where theirs is negative.
         """
         k = self.stiffness.at(theta)
         deflection, force = self.state
@@ -174,7 +175,10 @@ class GearMeshes:
         return k, line, line + k * np.where(has_back, self.backlash, 0.0), has_back
 
     def switches(self, x, theta):
-        """Compute the forces (..., m) [N] of drive flanks, then of back flanks where there are some."""
+        """Compute the forces (..., m) [N] of drive flanks, then of back flanks where there are some.
+
+        From deflections ``x`` (..., g, 1) [m] at the phases ``theta`` (..., n_bases) [rad].
+        """
         if not self.separates or self.smoothing:
             return np.zeros((*x.shape[:-2], 0))
         _, line, behind, has_back = self.flank_forces(x, theta)

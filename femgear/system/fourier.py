@@ -260,7 +260,8 @@ def series_of(samples, count: int, *, orders: tuple[int, ...] = (1,)) -> Fourier
 def tooth_lines(sun_planet, planet_ring, phases) -> np.ndarray:
     """Make the tooth errors (2N, H) [m] of one wave of each kind, shifted by the mesh phases (2N,) [periods].
 
-    The waves are harmonics 1 to H at phase zero [m]; phases as of `femgear.stages.lumped_set.phased_series`.
+    The waves ``sun_planet`` and ``planet_ring`` (H,) are harmonics 1 to H at phase zero [m]; phases as of
+    `femgear.stages.lumped_set.phased_series`.
 
     Raises
     ------

@@ -51,6 +51,15 @@ def test_every_page_is_in_the_index():
     assert set(named) - patterns == {page for page in pages if page in named} and len(named) == len(set(named))
 
 
+def test_another_page_leads_to_every_page():
+    """By a link or a card, beside the list of pages at the left."""
+    for page in PAGES:
+        others = [ROOT / "README.md", *(other for other in PAGES if other != page)]
+        texts = [other.read_text(encoding="utf-8") for other in others]
+        linked = [text for text in texts if f"({page.name}" in text or f":link: {page.stem}\n" in text]
+        assert linked or page.stem == "index", page.name
+
+
 @pytest.mark.slow
 def test_the_site_builds_without_a_warning(tmp_path):
     """Without running the examples, which have tests of their own; no file of another host is asked for."""

@@ -163,7 +163,11 @@ class HarmonicBalance:
         return self.reduction.value(self.orders @ np.atleast_1d(np.asarray(frequency, float)))
 
     def residual(self, lines, force, receptance) -> np.ndarray:
-        """Compute the residual ``X + T (F - reference X) - T_load S`` (n_columns, L) [m]."""
+        """Compute the residual ``X + T (F - reference X) - T_load S`` (n_columns, L) [m].
+
+        From ``lines`` X (n_columns, L) [m], ``force`` of the elements (n_columns, L) [N] and the ``receptance`` of
+        `receptance_at`.
+        """
         return lines + self._respond(receptance, force)
 
     def jacobian(self, products, receptance) -> np.ndarray:

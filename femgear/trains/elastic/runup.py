@@ -167,7 +167,10 @@ _RESONANCE = {
 
 
 def resonances(modes: Modes, forces: ModalForces, crossed: Crossings, speed, operating) -> dict[str, Any]:
-    """Collect what is known of crossings before the run-up; their speeds and those next to them [rad/s]."""
+    """Collect what is known of crossings before the run-up.
+
+    Of their speeds (c,) and the speeds ``operating`` (c,) of operation next to them, both [rad/s].
+    """
     mode = forces.mode[crossed.row]
     return {
         "mode": mode + 1,

@@ -338,13 +338,13 @@ def _side_bands(data, base: int, lines, title: str):
 TRANSIENT_FIGURES = {
     "transient": Figures(
         {
-            "transient_speeds": "Speed of the shaft that gives it and of the fastest one, low-passed to the rate of "
+            "transient_speeds": "Speed of the reference shaft and of the fastest one, low-passed to the rate of "
             "the records. Where the records are denser than the pixels, the band of their values is drawn.",
             "transient_deviations": "Rotation of the shafts less that of the rigid gearbox under the same torques; "
             "low-passed to the rate of the records. Bands: least to largest record.",
             "transient_forces": "Mesh forces along the lines of action, low-passed to the rate of the "
-            "records: peaks that are shorter are higher than here, the least and the largest force of all "
-            "steps stand in the table. Bands: least to largest record.",
+            "records, which cuts shorter peaks; the table has the least and the largest force of all "
+            "steps. Bands: least to largest record.",
         },
         draw=lambda drawn: transient_figures(drawn.data["transient"]),
     ),
@@ -354,7 +354,7 @@ TRANSIENT_FIGURES = {
             "window that overlap by half, root of the mean square, peak values. Dotted: mesh frequencies "
             "and their second and third harmonics at the mean speed. Where the speed changes, which the "
             "title tells, lines smear over frequency; over orders they do not.",
-            "side_bands": "Mesh force around a mesh line over orders of the shaft that gives the speed, in one segment "
+            "side_bands": "Mesh force around a mesh line over orders of the reference shaft, in one segment "
             "({}); a change of the speed does not smear them. Dotted: distances of the carrier's turn, or "
             "of the mesh line of the planetary stage.",
         },

@@ -86,7 +86,7 @@ class TransientResult(StageResult):
         negative = "on the back flank" if first.contact_loss else "where the linear mesh pulls"
         time, mesh, moving = ("time",), ("mesh",), ("time", "shaft")
         of_runs = (
-            ("spin", time, lambda r: r.angle, "rad", "angle of the shaft that gives the speed without its deviation"),
+            ("spin", time, lambda r: r.angle, "rad", "angle of the reference shaft without its deviation"),
             ("speed", moving, lambda r: r.speed[:, None] * ratio + r.velocity, "rad/s", "speed of rotation"),
             ("deviation", moving, lambda r: r.motion, "rad", "rotation less that of the rigid gearbox"),
             (
@@ -122,7 +122,7 @@ class TransientResult(StageResult):
         energy, momentum = [run.energy_balance.error for run in runs], [run.momentum for run in runs]
         variables |= {
             "torque": ("time load", torque, "N m", "external torque"),
-            "ratio": (("shaft",), ratio, "1", "speed over that of the shaft that gives it"),
+            "ratio": (("shaft",), ratio, "1", "speed over that of the reference shaft"),
             "energy_error": (("variant",), energy, "1", "error of the energy balance, relative"),
             "momentum_error": (("variant",), momentum, "1", "error of the angular momentum, relative"),
         }
@@ -242,7 +242,7 @@ class SpectrumResult(StageResult):
         variables = {
             "amplitude": ("variant mesh frequency", amplitude, "N", averaged),
             "order_amplitude": ("variant mesh order", by_order, "N", single),
-            "line_order": ("line", orders, "1", "order of the shaft that gives the speed"),
+            "line_order": ("line", orders, "1", "order of the reference shaft"),
             "line_frequency": ("line", hertz, "Hz", "frequency at the mean speed"),
             "line_amplitude": ("variant line mesh", line, "N", of_line),
             "line_orders": ("line base", multiples, "1", "multiples of the base frequencies"),
@@ -259,7 +259,7 @@ class SpectrumResult(StageResult):
             "variant": _names("variant", variants, "model"),
             "mesh": _names("mesh", model.spun.meshes, "gear mesh"),
             "frequency": (("frequency",), spectrum.frequency, "Hz", "frequency"),
-            "order": (("order",), order, "1", "order of the shaft that gives the speed"),
+            "order": (("order",), order, "1", "order of the reference shaft"),
             "line": _names("line", [line.name for line in lines], "line"),
             "base": _names("base", model.box.bases, "base frequency: turn of a carrier, or mesh"),
         }
