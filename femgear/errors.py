@@ -6,13 +6,15 @@ count. What is allowed but deserves a look is a `femgear.findings.Finding`.
 
 from __future__ import annotations
 
+import math
 import os
 import sys
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from typing import TypeVar
+from typing import TYPE_CHECKING, TypeVar
 
-import numpy as np
+if TYPE_CHECKING:
+    import numpy as np
 
 CODES = {
     "E-ALLOWANCE": "The play takes more from a tooth than it has.",
@@ -319,6 +321,8 @@ def checked_numbers(value, key: str, *, code: str, unit: str, kind: type[float] 
     CaseError
         Text, nothing, rows of different lengths or objects in place of numbers.
     """
+    import numpy as np  # noqa: PLC0415  femgear --help needs errors, but no numbers
+
     try:
         # numpy reads text such as "7" as a number, and nothing as nan; neither is one here
         if value is None or np.asarray(value).dtype.kind in "OSUmM":
@@ -368,7 +372,7 @@ def checked_count(value, key: str, *, code: str, least: int = 1) -> int:
         Not a whole number, or one below the least.
     """
     number = checked_numbers(value, key, code=code, unit="")
-    if number.ndim or not np.isfinite(number) or number != np.floor(number) or number < least:
+    if number.ndim or not math.isfinite(number) or number != math.floor(number) or number < least:
         raise CaseError(
             f"{number.tolist()} is not a possible number of {key}",
             code=code,

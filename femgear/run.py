@@ -22,7 +22,6 @@ from femgear.errors import CaseError, StorageError, nvh_library
 from femgear.exchange.dynamic_model import DynamicModel, StiffnessTable
 from femgear.exchange.formats import (
     SCALES,
-    Sampling,
     Signal,
     write_functions,
     write_matlab,
@@ -30,6 +29,7 @@ from femgear.exchange.formats import (
     write_wav,
     write_workbook,
 )
+from femgear.exchange.sampling import Sampling
 from femgear.findings import Finding, as_text, once, remark, tell
 from femgear.housing.sound import sound_quality
 from femgear.stages.protocol import (

@@ -204,7 +204,7 @@ CASE = PACKAGE.parent / "cases" / "planetary_27_40_108.toml"
 STEPS = {
     "import femgear": HEAVY,
     "from femgear.cli import main; main(['--version'])": HEAVY,
-    "main(['--help'])": HEAVY | {"scipy.linalg", "scipy.sparse", "scipy.special", "scipy.interpolate"},
+    "main(['--help'])": HEAVY | {"numpy", "scipy.linalg", "scipy.sparse", "scipy.special", "scipy.interpolate"},
     "import femgear.case.gear_set": HEAVY,
     "import femgear.storage.results": HEAVY,
     f"femgear.read_case({str(CASE)!r})": HEAVY | SOLVING,

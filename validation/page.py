@@ -11,7 +11,8 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from femgear.storage.files import storage_errors, write_text
+from femgear.storage.disk_errors import storage_errors
+from femgear.storage.files import write_text
 from validation.rows import ROUNDING, Row
 from validation.run import Validation
 

@@ -22,7 +22,7 @@ from femgear.app.document import tables_of_text
 from femgear.case.dependencies import Steps
 from femgear.case.sections import StaticSection
 from femgear.errors import CaseError, FemgearError, StorageError
-from femgear.exchange.formats import Sampling
+from femgear.exchange.sampling import Sampling
 from femgear.findings import as_data, by_severity
 from femgear.report.charts import chart
 from femgear.report.space import space

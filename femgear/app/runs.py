@@ -9,8 +9,8 @@ from pathlib import Path
 from typing import Any
 
 from femgear.app.worker import Requests
-from femgear.exchange.formats import Sampling
 from femgear.exchange.rexs import read_model
+from femgear.exchange.sampling import Sampling
 from femgear.findings import as_data
 from femgear.report.compare import compare_page
 from femgear.run import export_results, run_case

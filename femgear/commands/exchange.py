@@ -14,7 +14,7 @@ from femgear.commands.files import need_new_files, write_case_file
 from femgear.commands.program import Whole, app
 from femgear.commands.terminal import Progress, print_findings, say
 from femgear.errors import CaseError
-from femgear.exchange.formats import Sampling
+from femgear.exchange.sampling import Sampling
 
 
 @app.command(name="import")

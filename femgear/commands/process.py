@@ -14,14 +14,13 @@ import warnings
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
-import numpy as np
 from cyclopts import App, CycloptsError, MissingArgumentError
 
 from femgear.commands import INTERRUPTED, LOADING
 from femgear.commands.terminal import print_findings
 from femgear.errors import CaseError, FemgearError, printable
 from femgear.findings import FindingWarning
-from femgear.storage.files import noted_interrupts, storage_error
+from femgear.storage.disk_errors import noted_interrupts, storage_error
 
 _RARELY = 50_000
 """New objects after which garbage is looked for: more than by default, since what a run makes is kept."""
@@ -106,7 +105,11 @@ def _called(program_app: App, tokens: list[str], program: str) -> int:
                 remedy="ask for fewer speeds, positions, harmonics or elements",
             )
         )
-    except np.linalg.LinAlgError as error:
+    except ValueError as error:
+        from numpy.linalg import LinAlgError  # late: help is shown without numpy
+
+        if not isinstance(error, LinAlgError):
+            raise
         remedy = "look for masses, stiffnesses or dimensions of very different size"
         return _fail(FemgearError(f"equations cannot be solved: {error}", code="E-SOLVE", remedy=remedy))
     except ImportError as error:

@@ -22,7 +22,8 @@ from femgear.fe.meshing import gmsh_missing
 from femgear.gears.gear import Gear
 from femgear.gears.short_teeth import ShortTeeth
 from femgear.gears.tooth import half_sector
-from femgear.storage.files import storage_errors, write_text
+from femgear.storage.disk_errors import storage_errors
+from femgear.storage.files import write_text
 
 if TYPE_CHECKING:
     from femgear.report.space import SpaceBody

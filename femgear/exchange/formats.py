@@ -15,8 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from femgear.errors import CaseError, StorageError, nvh_library, printable
-from femgear.housing.sound import LEVELS
+from femgear.errors import StorageError, nvh_library, printable
 from femgear.storage.files import replaced_file
 
 if TYPE_CHECKING:
@@ -24,73 +23,7 @@ if TYPE_CHECKING:
 
 _QUANTITIES = {"m/s^2": 12, "Pa": 15}
 """Specific data type of a unit: universal file, dataset 58, record 9."""
-_SAMPLES = 50_000_000
-"""Samples of a signal, at most: 17 minutes at 48 kHz."""
-_SLOWEST = 1000  # samples a second: a file of fewer holds no gear noise, and few players take it
 _ROWS = 1_048_576  # of a sheet: ECMA-376 leaves it open, Excel has no more
-
-
-@dataclass(frozen=True)
-class Sampling:
-    """How signals are sampled.
-
-    Parameters
-    ----------
-    rate
-        Samples a second [Hz], 1000 or more; lines at half of it and above are left out.
-    duration
-        Of every signal at one speed [s]; whole turns of the carrier come nearest to it.
-    run_up
-        Duration of the run-up from the first to the last of its speeds [s].
-    pressure_scale
-        Full scale of WAV files of sound pressure [Pa]: the sample 1.0 stands for it. Default: one for all
-        files, which the sum of the amplitudes of no speed exceeds.
-    acceleration_scale
-        Full scale of WAV files of acceleration [m/s^2], with the same default.
-    force_scale
-        Full scale of WAV files of force [N], with the same default.
-    level
-        Unit and detector of order_cuts.csv: "mm/s rms", "g peak", "um peak", "dB rms" (re 1e-6 m/s^2), ...
-    """
-
-    rate: int = 48000
-    duration: float = 10.0
-    run_up: float = 30.0
-    pressure_scale: float | None = None
-    acceleration_scale: float | None = None
-    force_scale: float | None = None
-    level: str = LEVELS[0]
-
-    def __post_init__(self):
-        if self.level not in LEVELS:
-            raise CaseError(
-                "no such level",
-                code="E-CHOICE",
-                key="--level",
-                value=self.level,
-                limit=", ".join(LEVELS),
-                remedy="leave it out for the default",
-            )
-        for name, value in vars(self).items():
-            least = _SLOWEST if name == "rate" else 0.0
-            if name != "level" and value is not None and not (least <= value < np.inf and value > 0.0):
-                raise CaseError(
-                    "no such sampling",
-                    code="E-RANGE",
-                    key=f"--{name.replace('_', '-')}",
-                    value=value,
-                    limit=f"{least:g} Hz or more" if least else "a number above zero",
-                    remedy="leave it out for the default",
-                )
-        samples = self.rate * max(self.duration, self.run_up)
-        if samples > _SAMPLES:
-            raise CaseError(
-                "signals of so many samples take too much memory",
-                code="E-MEMORY",
-                value=f"{samples:.4g}",
-                limit=f"{_SAMPLES:.4g}",
-                remedy="lower --rate, --duration or --run-up",
-            )
 
 
 SCALES = {"Pa": "pressure_scale", "m/s^2": "acceleration_scale", "N": "force_scale"}

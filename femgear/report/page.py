@@ -29,7 +29,8 @@ from femgear.report.space import SPACE
 from femgear.report.style import png_bytes
 from femgear.report.tables import Block
 from femgear.second_process import shared
-from femgear.storage.files import checksum, storage_errors, write_bytes, write_text
+from femgear.storage.disk_errors import storage_errors
+from femgear.storage.files import checksum, write_bytes, write_text
 
 if TYPE_CHECKING:
     from femgear.stages.judgements import Judgement

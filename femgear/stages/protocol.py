@@ -29,7 +29,8 @@ if TYPE_CHECKING:
 
     from femgear.case.text import ReadCase
     from femgear.exchange.dynamic_model import DynamicModel
-    from femgear.exchange.formats import Sampling, Shapes, Signal, Spectrum
+    from femgear.exchange.formats import Shapes, Signal, Spectrum
+    from femgear.exchange.sampling import Sampling
     from femgear.findings import Finding
     from femgear.measured.heard_set import HeardSet
     from femgear.report.space import SpaceBody

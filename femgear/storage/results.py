@@ -28,6 +28,7 @@ from femgear import __version__
 from femgear.errors import StorageError
 from femgear.findings import Finding, as_data, from_data, remark, tell
 from femgear.storage.contents import Contents
+from femgear.storage.disk_errors import is_interrupt
 from femgear.storage.files import (
     WRITTEN,
     checked_name,
@@ -35,7 +36,6 @@ from femgear.storage.files import (
     csv_cell,
     exclusive_lock,
     foreign,
-    is_interrupt,
     is_temporary,
     list_own,
     read_dataset,

@@ -33,7 +33,8 @@ from femgear.errors import ContactError, FemgearError, StorageError
 from femgear.findings import NOTE, Finding, once, tell
 from femgear.stages.key_figures import HOURS
 from femgear.stages.protocol import Progress
-from femgear.storage.files import exclusive_lock, storage_errors
+from femgear.storage.disk_errors import storage_errors
+from femgear.storage.files import exclusive_lock
 from femgear.study.objectives import STAGES, StudyQuantity, has_figures
 from femgear.study.problem import Limit, Point, Problem, Variable, Vector
 from femgear.study.runner import Runner, check_complete

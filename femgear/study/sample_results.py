@@ -24,12 +24,12 @@ from femgear.report.style import BLUE, VERMILION, label, legend_below, new_figur
 from femgear.report.tables import Block, Marks
 from femgear.stages.protocol import Progress, one_blas_thread, silent
 from femgear.stages.static_results import HELD, LARGEST_PEAK_DOUBT, SERIES
+from femgear.storage.disk_errors import storage_errors
 from femgear.storage.files import (
     append_dataset,
     own_files,
     replaced_file,
     resumable,
-    storage_errors,
     write_text,
 )
 from femgear.storage.results import dataset

@@ -101,7 +101,7 @@ def test_sound_of_a_run_up(tmp_path, monkeypatch, capsys):
 def test_options_of_the_sound_are_those_of_the_page():
     text, _, _ = read_page("run_up_sound.md")
     for option, default in re.findall(r"^\| `--([\w-]+)` \| ([\d]+)", text, flags=re.MULTILINE):
-        from femgear.exchange.formats import Sampling
+        from femgear.exchange.sampling import Sampling
 
         assert getattr(Sampling(), option.replace("-", "_")) == float(default)
 

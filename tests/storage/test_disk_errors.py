@@ -5,7 +5,7 @@ import os
 
 import pytest
 
-from femgear.storage.files import storage_error
+from femgear.storage.disk_errors import storage_error
 
 
 @pytest.mark.parametrize("number", [errno.ENOSPC, errno.EDQUOT])

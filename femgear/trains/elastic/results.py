@@ -17,7 +17,8 @@ import numpy as np
 from femgear.case.dependencies import Entries
 from femgear.case.gear_set import planetary_set, set_deviations
 from femgear.case.quantities import RPM
-from femgear.exchange.formats import Sampling, Shapes, Signal, Spectrum, line_extent
+from femgear.exchange.formats import Shapes, Signal, Spectrum, line_extent
+from femgear.exchange.sampling import Sampling
 from femgear.findings import Finding
 from femgear.gears.modifications import FlankForm
 from femgear.gears.planetary import mesh_names

@@ -15,7 +15,8 @@ import numpy as np
 
 from femgear.case.quantities import RPM
 from femgear.errors import CaseError
-from femgear.exchange.formats import Sampling, Shapes, Signal, Spectrum, line_extent
+from femgear.exchange.formats import Shapes, Signal, Spectrum, line_extent
+from femgear.exchange.sampling import Sampling
 from femgear.findings import Finding, tell
 from femgear.housing.sound import run_up_signal, sampled_signal, whole_turns
 from femgear.stages.key_figures import REFERENCE_ACCELERATION

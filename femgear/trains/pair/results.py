@@ -10,7 +10,8 @@ import numpy as np
 
 from femgear.case.dependencies import Entries
 from femgear.case.quantities import RPM
-from femgear.exchange.formats import Sampling, Signal, line_extent
+from femgear.exchange.formats import Signal, line_extent
+from femgear.exchange.sampling import Sampling
 from femgear.findings import Finding, tell
 from femgear.gears.pair import GearPair
 from femgear.housing.sound import run_up_signal, sampled_signal, whole_turns

@@ -7,7 +7,8 @@ import pytest
 import xarray as xr
 
 from femgear.errors import CaseError
-from femgear.exchange.formats import Sampling, write_functions
+from femgear.exchange.formats import write_functions
+from femgear.exchange.sampling import Sampling
 from femgear.trains.gearbox.signals import (
     GEARBOX_RECORDED,
     gearbox_order_tables,

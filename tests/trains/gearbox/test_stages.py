@@ -9,7 +9,7 @@ from small_gearbox import pair_tables
 
 from femgear.case.dependencies import Steps
 from femgear.errors import CaseError
-from femgear.exchange.formats import Sampling
+from femgear.exchange.sampling import Sampling
 from femgear.run import export_results, run_case
 from femgear.storage.results import run_folder
 from femgear.trains.drafts import new_case
