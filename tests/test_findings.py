@@ -221,12 +221,13 @@ def exported(wanted: str, rows: int | None = None, **sampling):
 
     def work(folder: Path) -> tuple[Finding, ...]:
         from femgear.exchange import formats
+        from femgear.exchange.sampling import Sampling
         from femgear.run import export_results
         from femgear.storage.files import list_own
 
         results = open_results(synthetic_run(folder / "out"))
         list_own(folder / "exported")
-        how = formats.Sampling(duration=0.1, **sampling)
+        how = Sampling(duration=0.1, **sampling)
         with pytest.MonkeyPatch.context() as patch:
             if rows is not None:
                 patch.setattr(formats, "_ROWS", rows)
