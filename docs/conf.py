@@ -187,7 +187,7 @@ def read_source(app, docname: str, source: list[str]) -> None:
     A link whose text is the name of a file, as it is read on a disk, gets the title of the page.
     """
     if docname == "index":
-        pattern = re.compile(r"(?m)^(\S+\*)\n")
+        pattern = re.compile(r"(?m)^([\w/]+\*)\n")
         source[0] = pattern.sub(lambda line: line[0] if any(DOCS.glob(line[1] + ".*")) else "", source[0])
     source[0] = re.sub(r"\[(\w+\.md)\](?=\(\1)", lambda link: f"[{title_of(link[1])}]", source[0])
 
