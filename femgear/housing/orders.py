@@ -285,6 +285,32 @@ def counted_turns(part: str, teeth, symmetry: int, tolerance: float) -> int:
     return max(places // 2, MOST_TURNS) if step > 4 * tolerance * places else MOST_TURNS
 
 
+def part_orders(
+    teeth: tuple[int, int | None, int | None], symmetry: int, tolerance: float
+) -> Iterator[tuple[int, np.ndarray]]:
+    """Find where a fault of the sun, and one of a planet, has lines: an order (m,) from zero to a step, and that step.
+
+    They repeat after the step, which is the symmetry of the spacing for the sun and 1 for one planet; zero is among
+    them, and turns are those of `counted_turns`. Parts that make whole turns have no others and are left out.
+
+    Parameters
+    ----------
+    teeth : (ring, sun, planet)
+        Of sun and planet None where they are not known.
+    symmetry : int
+        Of `spacing_symmetry`.
+    tolerance : float
+        Distance of orders that count as one.
+    """
+    ring, sun, planet = teeth
+    rates = ("sun", sun and Fraction(ring + sun, sun), symmetry), ("planet", planet and Fraction(ring, planet), 1)
+    for part, rate, step in rates:
+        if not rate or (rate / step).denominator == 1:
+            continue
+        turns = range(counted_turns(part, teeth, symmetry, tolerance) + 1)
+        yield step, np.array(sorted({float(sign * turn * rate % step) for turn in turns for sign in (1, -1)}))
+
+
 def find_lines(order, amplitude, *, threshold: float) -> np.ndarray:
     """Find the lines of a spectrum that reach a threshold [dB] over its largest value, by number, ascending.
 

@@ -16,7 +16,7 @@ from femgear.findings import Finding, tell
 from femgear.housing.orders import OrderSpectrum, array_factor, spacing_symmetry
 from femgear.measured.averages import carrier_average, gear_average
 from femgear.measured.channels import choose_channel
-from femgear.measured.heard_set import HeardSet, MeshLines, heard_set, lines_near_mesh
+from femgear.measured.heard_set import HeardSet, heard_set
 from femgear.measured.lines import (
     VERDICTS,
     MeasuredLine,
@@ -30,6 +30,7 @@ from femgear.measured.recordings import channel_in_si, read_by_turns, read_chann
 from femgear.measured.requests import FurtherFiles, LineSearch, Recording
 from femgear.measured.spectra import frequency_response, power_density, windowed_spectrum
 from femgear.measured.turns import AngleSignal
+from femgear.measured.wrong_turns import MeshLines, lines_near_mesh
 from femgear.report.style import (
     BLACK,
     BLUE,
@@ -52,8 +53,6 @@ _SHOWN = 40
 """Lines of the printed table."""
 _LINES, _SPECTRUM, _FIGURE = "lines.csv", "order_spectrum.csv", "lines.png"
 _HALF_WIDTH = 12
-_MESH_SHARE = 0.02
-"""Share of the power of lines near mesh harmonics below which the speed is doubted."""
 _HARMONICS = 3
 
 
@@ -95,20 +94,20 @@ def measured_verdict(
     spectrum = windowed_spectrum(signal)
     order, height = sharpened_lines(spectrum, search.threshold)
     wrong = level_uncertainty(spectrum, order, height, time_error=signal.time_error, speed=signal.speed)
-    _tell_wrong_turns(lines_near_mesh(gear_set, order, height, tolerance), recording, float(spectrum.order[-1]))
+    highest = float(spectrum.order[-1])
+    _tell_wrong_turns(lines_near_mesh(gear_set, order, height, tolerance, highest), recording, highest)
     lines = judge_lines(order, height, wrong, gear_set.angles, gear_set.teeth, tolerance)
     return MeasuredVerdict(gear_set, signal, spectrum, lines, tolerance)
 
 
 def _tell_wrong_turns(mesh: MeshLines, recording: Recording, highest: float) -> None:
-    """Say where mesh harmonics have no lines, all or most, and which factor of the speed would give them some."""
-    if mesh.share > _MESH_SHARE and mesh.factor == 1.0:
+    """Say where lines do not lie at places of the set, and which factor of the speed would bring them there."""
+    if mesh.fits and mesh.factor == 1.0:
         return
-    words = f"lines near mesh harmonics have {mesh.share:.1%} of the power of all lines up to order {highest:.4g}"
-    if mesh.share > _MESH_SHARE and mesh.factor > 1.0:
-        words = f"of the mesh harmonics only multiples of {mesh.factor:.0f} have lines"
+    words = f"lines up to order {highest:.4g} lie as they would without this set"
     if mesh.factor != 1.0:
-        words += f"; all would have some if the carrier made {mesh.factor:.4g} times as many turns"
+        words = f"lines lie far better at orders of the set if the carrier made {mesh.factor:.4g} times as many turns: "
+        words += f"{mesh.share_then:.0%} of them near mesh harmonics, not {mesh.share:.0%}"
     key = "--speed" if recording.pulses is None else "--pulses"
     ways = "the speed of the input" if recording.pulses is None else "--pulses-of and --per-turn"
     tell(Finding("W-UNSTEADY", key, words, remedy=f"check {ways}, and that the recording is one of this set"))

@@ -71,7 +71,7 @@ def test_pulses_that_are_counted_as_half_of_them_are_told_with_the_factor(tmp_pa
     measured_verdict(read_case(CASE), path, Recording(pulses="tacho", per_turn=2))
     (text,) = (str(one.message) for one in recwarn if "W-UNSTEADY" in str(one.message))
     assert (
-        "only multiples of 2 have lines" in text
+        "near mesh harmonics, not" in text
         and "if the carrier made 2 times as many turns" in text
         and "--per-turn" in text
     )
