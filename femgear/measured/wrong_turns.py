@@ -42,7 +42,7 @@ class MeshLines:
     Parameters
     ----------
     share : float
-        Of the roots of the heights of all lines, that of those near mesh harmonics where the symmetry of the spacing allows them.
+        Of the roots of the heights of all lines, that of those near mesh harmonics that the spacing allows.
     factor : float
         Turns of the carrier over those that were counted, with which lines lie far better; 1 where there is none.
     share_then : float
