@@ -164,7 +164,7 @@ CATALOGUE = {
     "W-FACE-LOAD": Meaning(
         DOUBT,
         "Slices are too wide for the load distribution over the face width.",
-        "load over the width is coarse",
+        "coarse load over the width",
         "Take more slices, or stiffer shafts and bearings where the face width lifts.",
     ),
     "W-FAULT": Meaning(
@@ -488,7 +488,7 @@ CATALOGUE = {
     "W-TAIL": Meaning(
         DOUBT,
         "The highest harmonics of a response are not small.",
-        "too few harmonics or side bands",
+        "too few harmonics",
         "Raise the number that the message names; forces and levels change by what it says.",
     ),
     "W-TEETH": Meaning(
@@ -586,7 +586,8 @@ class Finding:
     limit : str, optional
         What is usual: within it there would be no finding.
     concerns : str, optional
-        Gear, flank or kind of mesh whose numbers it is about, where these are not all that its code is about.
+        Gear, flank or kind of mesh whose numbers it is about, where these are not all that its code is about; kinds of
+        entries that are estimated.
     stage : str, optional
         Stage of a run whose results draw it, empty of the case. Findings that differ in it alone are equal.
 

@@ -75,10 +75,10 @@ async def _respond(send: Any, status: int, text: bytes, headers: list[tuple[byte
 
 def answers_page() -> str:
     """Make the page within the window on which answers appear; it draws what is sent to it."""
-    from femgear.report.page import document, part_of
+    from femgear.report.page import POINTER, document, part_of
 
-    caption = "Gears, shafts, bearings, sensors (red) and feet (black). The pointer names them."
-    part = f'<template id="part">{part_of("solid").format(escape(caption))}</template>\n'
+    caption = "Gears, shafts, bearings, sensors (red) and feet (black)."
+    part = f'<template id="part">{part_of("solid").format(escape(caption), POINTER)}</template>\n'
     style = f"<style>{(_WEB / 'live.css').read_text('utf-8')}</style>\n"
     main = f"{style}{part}{(_WEB / 'live.html').read_text('utf-8')}"
     script = (_WEB / "live.js").read_text("utf-8")

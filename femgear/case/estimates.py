@@ -193,7 +193,8 @@ def with_estimates(case: Any) -> tuple[Any, tuple[Finding, ...]]:
     shown = ", ".join(f"{key} = {estimated[key]}" for key in missing)
     text = f"left out and estimated from the gears: {shown}"
     remedy = "give what is known: modes and vibration depend on it, a static solution of fixed members does not"
-    return case, (Finding("W-ESTIMATED", missing[0], text, remedy=remedy),)
+    kinds = dict.fromkeys("stiffnesses" if "stiffness" in key or "foundation" in key else "masses" for key in missing)
+    return case, (Finding("W-ESTIMATED", missing[0], text, remedy=remedy, concerns=" and ".join(kinds)),)
 
 
 def _on_shaft(case: Any, key: str) -> bool:

@@ -13,7 +13,6 @@ from cyclopts import Parameter
 from femgear.commands.files import write_case_file
 from femgear.commands.program import Quantity, Whole, app, whole_number
 from femgear.commands.terminal import Progress, print_blocks, print_findings, say
-from femgear.errors import CaseError
 from femgear.study.teeth_request import TeethStrength, WantedTeeth
 
 
@@ -166,29 +165,35 @@ def casing(
 ) -> int:
     """Give a gearbox a rigid casing on feet, three sensors and a run-up, all estimated, so that a run has its sound.
 
+    A set, a pair, and a file of a former model, becomes a gearbox before, as by femgear gearbox.
+
     Parameters
     ----------
     case
-        TOML case file of a gearbox without a casing.
+        TOML case file of a gearbox without a casing, of a set or of a pair.
     output
         Case file to write, in the folder of the case if that names other files. Default: NAME_in_casing.toml.
     force
         Replace the file.
     """
     from femgear.case import text as case_text
+    from femgear.trains.gearbox_of_case import gearbox_of_case
     from femgear.trains.reading import parse_case, read_case
     from femgear.trains.registry import train_of
 
-    read = read_case(case)
-    train = train_of(read)
-    if train.draft_casing is None:
-        limit, remedy = 'model = "gearbox"', f"femgear gearbox {shlex.quote(str(case))} makes one of a set or a pair"
-        raise CaseError(f"{train.words} has no casing of its own", code="E-MODEL", limit=limit, remedy=remedy)
-    tables, findings = train.draft_casing(read)
+    read, text = read_case(case), case_text.read_text(case)
+    former, findings = any(finding.code == "W-FORMER" for finding in read.notices), ()
+    if train_of(read).draft_casing is None or former:
+        written = gearbox_of_case(read)
+        text, findings = case_text.write(written.tables), written.findings
+        read = parse_case(text, name=str(case))
+    draft = train_of(read).draft_casing
+    assert draft is not None
+    tables, estimates = draft(read)
     output = output or case.with_name(f"{case.stem}_in_casing.toml")
-    text = f"{case_text.read_text(case).rstrip()}\n\n{tables}"
+    text = f"{text.rstrip()}\n\n{tables}"
     parse_case(text, name=str(output))  # what is no case is refused before a file is written
-    print_findings(findings)
+    print_findings((*findings, *estimates))
     write_case_file(text, output, force=force)
     say(f"next:    femgear run {shlex.quote(str(output))}")
     return 0

@@ -52,6 +52,13 @@ _CHARTS = "charts.json"
 """File of what the charts of the page show."""
 _DATA = {_CHARTS: "charts", SOLID: "solid", SPACE: "space", EXPLORER: "runup"}
 """Files of a run that the scripts of its page draw, and their names there."""
+_WORDS_ROOM = 2150
+"""Characters of the longest card and of the sentence, which is four cards wide, over the width of all, from which on
+gears and charts below are drawn smaller."""
+_CAPTION = 100
+"""Most characters of a note on the gears that stands below them on page one."""
+POINTER = "The pointer names them. "
+"""What is said of parts in space on a screen."""
 _BODIES = {"gear": "gears", "shaft": "shafts", "bearing": "bearings"}
 _BODIES |= {"sensor": "sensors (red)", "foot": "feet (black)"}
 """Words of the kinds of `femgear.report.space.SpaceBody`."""
@@ -247,7 +254,7 @@ def _anchor(name: str) -> str:
     return name.lower().replace(" ", "-")
 
 
-def _front(train: Train, results: Results, charts, caption: str | None) -> str:
+def _front(train: Train, results: Results, charts, caption: tuple[str, str] | None) -> str:
     """Make page one: what the train does, a sentence, a card for every question, the gears in space and two charts.
 
     The gears are drawn in space where there is a caption of them.
@@ -257,7 +264,7 @@ def _front(train: Train, results: Results, charts, caption: str | None) -> str:
     text = "".join(f'<p class="{kind}">{escape(words)}</p>\n' for kind, words in texts.items() if words)
     cards = "".join(map(_card, judgements))
     shown = "".join(front_chart(*place) for place in _front_places(train, charts))
-    solid = "" if caption is None else part_of("solid").format(escape(caption))
+    solid = "" if caption is None else part_of("solid").format(*map(escape, caption))
     charts_beside = f'<div class="charts">\n{shown}</div>\n' if shown else ""
     both = " both" * bool(solid and shown)
     below = f'<div class="top{both}">\n{solid}{charts_beside}</div>\n' if solid or shown else ""
@@ -265,19 +272,21 @@ def _front(train: Train, results: Results, charts, caption: str | None) -> str:
     on_paper = 2 if len(judgements) < 5 else 3
     style = f"--columns: {columns}; --paper-columns: {on_paper}"
     listed_cards = f'<ul class="cards" style="{style}">\n{cards}</ul>\n' if cards else ""
-    many = " many" * (columns < len(judgements))
+    longest = max((len(judgement.answer) + len(judgement.limit) for judgement in judgements), default=0)
+    many = " many" * (columns < len(judgements) or longest * columns + 4 * len(sentence) > _WORDS_ROOM)
     return f'<section class="front{many}" aria-label="Page one">\n{text}{listed_cards}{below}</section>\n'
 
 
-def _caption(gears: Sequence[Block], data) -> str | None:
-    """Say what is seen of the gears in space; None where nothing was drawn."""
+def _caption(gears: Sequence[Block], data) -> tuple[str, str] | None:
+    """Say what is seen of the gears in space, and what the pointer does beside; None where nothing was drawn."""
     if "solid" in data:
-        return "; ".join(gears[0].notes[:2]) + ". Blue: paths of contact, on the lines of action."
+        notes = [note for note in gears[0].notes[:2] if len(note) <= _CAPTION]
+        return ". ".join([*filter(None, ["; ".join(notes)]), "Blue: paths of contact, on the lines of action."]), ""
     if "space" not in data:
         return None
     kinds = {body["kind"] for body in data["space"]["bodies"]}
     words = [words for kind, words in _BODIES.items() if kind in kinds]
-    return " and ".join(", ".join(words).rsplit(", ", 1)).capitalize() + ". The pointer names them."
+    return " and ".join(", ".join(words).rsplit(", ", 1)).capitalize() + ".", POINTER
 
 
 def _front_places(train: Train, charts) -> list[tuple[str, int]]:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from femgear.findings import CATALOGUE, NOTE, Finding, by_severity, findings_in, in_words
+from femgear.findings import CATALOGUE, NOTE, Finding, by_severity, findings_in
 from femgear.report.response import some_at_a_time, stored_harmonics
 from femgear.report.style import NOTICEABLE
 from femgear.system.fourier import fluctuation, sample
@@ -153,9 +153,9 @@ class Marks:
         return text + "".join(self._marks[code] for code in raised)
 
     @property
-    def codes(self) -> tuple[str, ...]:
-        """The marks that were used with words and codes, where there is no room for `notes`."""
-        return tuple(f"{mark} {in_words(code)}" for code, mark in self._marks.items() if code in self._used)
+    def words(self) -> tuple[str, ...]:
+        """The marks that were used with few words, where there is no room for `notes`."""
+        return tuple(f"{mark} {CATALOGUE[code].words}" for code, mark in self._marks.items() if code in self._used)
 
     @property
     def notes(self) -> tuple[str, ...]:

@@ -1,15 +1,17 @@
-"""What a gear train does, in one sentence: torque, speed and power at its ends, and its ratio."""
+"""What a gear train does, in one sentence: torque, speed and power at its ends, its ratio and mesh frequency."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
+
 from femgear.case.planetary import Case, output_member
 from femgear.case.quantities import RPM
-from femgear.gears.kinematics import torque_ratios
+from femgear.gears.kinematics import planet_motion, torque_ratios
 
 _POWERS = ("MW", 1e6), ("kW", 1e3), ("W", 1.0)
 """Units of power, from the largest, with their sizes [W]."""
@@ -97,16 +99,25 @@ def set_duty(case: Case) -> str:
         ShaftEnd(driving, operation.torque, operation.speeds),
         ShaftEnd(driven, -operation.torque / ratio, tuple(ratio * speed for speed in operation.speeds)),
     )
-    return duty_sentence(ends)
+    of_members = {member: np.zeros(len(operation.speeds)) for member in share}
+    of_members |= {end.name: np.array(end.speeds) for end in ends}
+    sun, planet = case.sun.teeth, case.planet.teeth
+    return duty_sentence(ends, mesh_words(planet_motion(of_members["sun"], of_members["carrier"], sun, planet)[1]))
+
+
+def mesh_words(hertz: Iterable[float]) -> str:
+    """Write how often teeth come into mesh [Hz], from the least to the most often; empty of none."""
+    often = sorted({float(f"{abs(value):.6g}") for value in hertz} - {0.0})
+    return f"teeth mesh at {' to '.join(map(in_digits, often[:: max(len(often) - 1, 1)]))} Hz" if often else ""
 
 
 def pair_duty(case: Any) -> str:
     """Write what a pair does."""
     ratio, operation = case.gear_1.teeth / case.gear_2.teeth, case.operation
     speeds = tuple(ratio * speed for speed in operation.speeds)
-    return duty_sentence(
-        (ShaftEnd("gear 1", operation.torque, operation.speeds), ShaftEnd("gear 2", -operation.torque / ratio, speeds))
-    )
+    first = ShaftEnd("gear 1", operation.torque, operation.speeds)
+    hertz = [case.gear_1.teeth * speed / (2.0 * math.pi) for speed in operation.speeds]
+    return duty_sentence((first, ShaftEnd("gear 2", -operation.torque / ratio, speeds)), mesh_words(hertz))
 
 
 def in_digits(value: float) -> str:

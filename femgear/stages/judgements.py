@@ -22,7 +22,8 @@ from femgear.stages.strength import OF_ROOTS, RatedFlank, Rating, gear_words
 State = Literal["good", "look", "bad", "open"]
 _WORDS: dict[State, str] = {"good": "✓ holds", "look": "▲ look", "bad": "✕ fails", "open": "○ no limit"}
 """What the colour of a card says, for those who see no colours."""
-STRONG, LIFE, HEAT, SMOOTH, QUIET, SURE = (
+FAULTY, STRONG, LIFE, HEAT, SMOOTH, QUIET, SURE = (
+    "What does the fault do?",
     "Is it strong enough?",
     "How long does it live?",
     "Does it stay cool?",
@@ -86,6 +87,22 @@ class Least:
     value: float
     where: str
     over_life: bool = False
+
+
+@dataclass(frozen=True)
+class NotRated:
+    """Why a train has no safeties.
+
+    Parameters
+    ----------
+    reason : str
+        What is missing.
+    remedy : str
+        What gives safeties.
+    """
+
+    reason: str = "the case gives no treatment of its gears"
+    remedy: str = "give material.treatment and material.hardness for safeties"
 
 
 def joined_sentence(judgements: Iterable[Judgement]) -> str:
@@ -173,7 +190,7 @@ def _raised(findings: Iterable[Finding], codes: Sequence[str]) -> list[str]:
 
 def _doubts(findings: Iterable[Finding], codes: Sequence[str]) -> str:
     """Name the doubts and faults with some codes; empty of none."""
-    return doubt_words([in_words(code) for code in _raised(findings, codes)])
+    return doubt_words([CATALOGUE[code].words for code in _raised(findings, codes)])
 
 
 def doubt_words(doubts: Sequence[str]) -> str:
@@ -194,7 +211,7 @@ def judge_strength(
     findings: Iterable[Finding] = (),
     doubts: Sequence[str] = (),
     open_factors: str = "",
-    remedy: str = "give material.treatment and material.hardness for safeties",
+    without: NotRated = NotRated(),
     unrated: Sequence[str] = (),
 ) -> Judgement:
     """Judge safeties against those that the case asks for.
@@ -213,8 +230,8 @@ def judge_strength(
         Codes of the findings that concern the safeties.
     open_factors : str
         Load factors that were taken as 1, in words.
-    remedy : str
-        What gives safeties where there are none.
+    without : NotRated
+        Why there are no safeties, where there are none.
     unrated : sequence of str
         Gears or stages that carry and have no safety.
     """
@@ -233,7 +250,8 @@ def judge_strength(
         words = ", ".join(CATALOGUE[code].words for code in beyond)
         return Judgement(STRONG, "bad", answer, "; ".join(map(in_words, beyond)), f"Not strong enough: {words}")
     if not rated:
-        return Judgement(STRONG, "open", stresses or "not rated", remedy, "Its strength is not rated")
+        sentence = f"Its strength is not rated: {without.reason}"
+        return Judgement(STRONG, "open", stresses or "not rated", without.remedy, sentence)
     low = [(symbol, least, required) for symbol, least, required in rated if not least.value >= required]
     answer = ", ".join(f"{symbol} {least.value:.2f} ({least.where})" for symbol, least, _ in rated)
     limit = (
@@ -380,15 +398,23 @@ def judge_smoothness(answer: str, results: Any, stages: Sequence[str]) -> Judgem
     if not present:
         return Judgement(SMOOTH, "open", answer or "not known", "no motion was computed")
     against = list(dict.fromkeys(_against(results, present)))
+    rests_on = estimates_words(results.findings)
     if not against and any(finding.code == "W-TAIL" and finding.severity == DOUBT for finding in results.findings):
-        return _smoothness("look", answer, _FEW_HARMONICS)
+        return _smoothness("look", answer, f"{_FEW_HARMONICS}{rests_on}")
     if not against and any(finding.code == "W-OPEN" for finding in results.findings):
-        return _smoothness("look", answer, "a planet carries nothing at some positions")
+        return _smoothness("look", answer, f"a planet carries nothing at some positions{rests_on}")
     if not against:
         judged = any("stable" in results[stage] for stage in present)
         words = "teeth stay in contact, motions are stable" if judged else "teeth stay in contact"
-        return _smoothness("good", answer, words)
-    return _smoothness("look", answer, ", ".join(against), f"At some speeds {' and '.join(against)}")
+        return _smoothness("good", answer, f"{words}{rests_on}")
+    return _smoothness("look", answer, f"{', '.join(against)}{rests_on}", f"At some speeds {' and '.join(against)}")
+
+
+def estimates_words(findings: Iterable[Finding]) -> str:
+    """Say which values that vibration rests on are estimated; empty of none."""
+    estimated = (finding.concerns for finding in findings if finding.code == "W-ESTIMATED")
+    kinds = dict.fromkeys(filter(None, estimated))
+    return f"; rests on estimated {_and(list(kinds))}" if kinds else ""
 
 
 def _smoothness(state: State, answer: str, words: str, sentence: str = "") -> Judgement:
@@ -410,9 +436,9 @@ def _against(results: Any, stages: Sequence[str]) -> Iterator[str]:
         yield "motions are not stable"
 
 
-_FEW_HARMONICS = "mesh forces may change: too few harmonics or side bands were taken (W-TAIL)"
+_FEW_HARMONICS = "mesh forces may change: too few harmonics or side bands were taken"
 """Of a run whose forces a longer excitation would change."""
-_CLEAR = "no resonance makes the level at a speed of operation"
+CLEAR = "no resonance makes the level at a speed of operation"
 MAKES_LEVEL = 0.5
 """Share of the level from which on one resonance makes it."""
 NEAR_RESONANCE = 10.0
@@ -489,7 +515,7 @@ def judge_noise(
     answer: str,
     sentence: str,
     resonance: str = "",
-    open_words: str = _CLEAR,
+    open_words: str = CLEAR,
     margins: Sequence[LevelMargin] = (),
     doubts: str = "",
 ) -> Judgement:
@@ -541,5 +567,7 @@ def judge_numbers(findings: Sequence[Finding], complete: bool) -> Judgement:
         codes = list(dict.fromkeys(finding.code for finding in doubts if finding.code))
         shown = ", ".join(map(in_words, codes[:MOST_DOUBTS]))
         shown += f" and {len(codes) - MOST_DOUBTS} more" if len(codes) > MOST_DOUBTS else ""
-        return Judgement(SURE, "look", f"{len(doubts)} doubt{'s' * (len(doubts) > 1)}", shown)
-    return Judgement(SURE, "good", "no doubt was raised", "solutions converged, samples resolve them")
+        count = len(codes) or len(doubts)
+        return Judgement(SURE, "look", f"{count} doubt{'s' * (count > 1)}", f"{shown}{estimates_words(findings)}")
+    words = f"solutions converged, samples resolve them{estimates_words(findings)}"
+    return Judgement(SURE, "good", "no doubt was raised", words)

@@ -1,4 +1,4 @@
-"""What deserves a look in a case with faults of teeth: what the model leaves out, and where their lines lie."""
+"""Faults of teeth in words: where they are, what they do, what the model leaves out, and where their lines lie."""
 
 from __future__ import annotations
 
@@ -7,10 +7,13 @@ from collections.abc import Iterator
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
-from femgear.case.fault_sections import keyed_faults
+import numpy as np
+
+from femgear.case.fault_sections import FaultSection, keyed_faults
 from femgear.case.gear_set import planetary_set, set_deviations
 from femgear.contact.flank_pairs import RIGHT, acting_flanks
 from femgear.findings import Finding
+from femgear.gears.deviations import rotational_symmetry
 from femgear.gears.faults import BrokenTip, Crack, MissingTooth, Spall, ToothFault
 from femgear.gears.pair import BRANCH
 from femgear.report.tables import Block, tabulate
@@ -28,6 +31,10 @@ _LEFT_OUT = {
     "are those of a whole one",
 }
 """What the model of every kind of fault leaves out."""
+_SHOWS = 0.02
+"""Change of a transmission error or of a share by a fault from which on it is told, over its usual value."""
+_HEARD = 1e-4
+"""Line that a fault makes new, from which on it is told, over the largest line."""
 
 
 def fault_findings(case: Any) -> Iterator[Finding]:
@@ -124,6 +131,96 @@ def describe_faults(case: Any, mesh_frequency: float | None) -> Iterator[Block]:
     }
     notes = tuple(f"{text}: drawings have the tooth whole" for text in undrawn_faults(case))
     yield replace(tabulate("Faults of teeth", faults, columns), notes=notes)
+
+
+def fault_words(case: Any) -> list[str]:
+    """Name the faults of a case by gear, tooth, kind and size: ``"planet 1, tooth 3: crack of 1.5 mm"``."""
+    gears = planetary_set(case)
+    names = {(body.gear, body.copy): body.name for body in gears.bodies}
+    return [
+        f"{names[fault.gear, fault.copy]}, "
+        f"{'all teeth' if fault.tooth is None else f'tooth {fault.tooth}'}: {_size_words(_section(case, key))}"
+        for key, fault in keyed_faults(case, gears)
+    ]
+
+
+def _section(case: Any, key: str) -> FaultSection:
+    """Section of a fault by its entry, such as ``planet.fault[0]``."""
+    gear, _, number = key.partition(".fault[")
+    return getattr(case, gear).fault[int(number.rstrip("]"))]
+
+
+def _size_words(section: FaultSection) -> str:
+    """Write the kind of a fault with its size."""
+    depth, length = section.depth or 0.0, section.length or 0.0
+    match section.kind:
+        case "crack":
+            return f"crack of {1e3 * depth:.4g} mm"
+        case "broken corner":
+            return f"tip broken off by {1e3 * length:.4g} mm"
+        case "spall":
+            return f"pit of {1e3 * length:.4g} mm, {1e6 * depth:.4g} µm deep"
+        case "wear":
+            return f"worn by {1e6 * max((depth, *(section.depths or ()))):.4g} µm"
+        case _:
+            return "missing"
+
+
+def fault_effects(results: Any) -> Iterator[str]:
+    """Tell what the faults of a run do: to the transmission error, to the load sharing, and to the lines of a sensor.
+
+    Mesh periods in which a faulty tooth carries are told from the others by the median of all: a fault of one tooth
+    acts in few of them.
+    """
+    periods = int(results.static.attrs["mesh_periods"]) if "static" in results.stages else 1
+    if periods > 1:
+        yield _error_effect(results.static, periods)
+        if results.static.sizes.get("planet", 1) > 1:
+            yield _share_effect(results.static)
+    if "housing" in results.stages:
+        yield from _line_effect(results)
+
+
+def _error_effect(static: Any, periods: int) -> str:
+    """Compare the transmission error of the worst mesh period with that of the others, where it rises most."""
+    ste = static["ste"].values
+    of_periods = np.ptp(ste.reshape(len(ste), periods, -1), axis=2)
+    usual, worst = np.median(of_periods, axis=1), of_periods.max(axis=1)
+    mesh = int((worst - usual).argmax())
+    if worst[mesh] < (1.0 + _SHOWS) * usual[mesh]:
+        return f"no mesh period has {_SHOWS:.0%} more transmission error than the others"
+    return f"transmission error {1e6 * worst[mesh]:.3g} in place of {1e6 * usual[mesh]:.3g} µm"
+
+
+def _share_effect(static: Any) -> str:
+    """Compare the share of the planet whose load changes most with what it carries else."""
+    share = static["load_share"].values
+    usual = np.median(share, axis=1)
+    planet, position = np.unravel_index(int(np.abs(share - usual[:, None]).argmax()), share.shape)
+    if abs(share[planet, position] - usual[planet]) < _SHOWS * usual[planet]:
+        return "planets share the load as without it"
+    name = f"planet {static['planet'].values[planet]}"
+    return f"{name} carries {share[planet, position]:.1%} in place of {usual[planet]:.1%} of the torque"
+
+
+def _line_effect(results: Any) -> Iterator[str]:
+    """Tell the largest line that equal whole planets have not, at the fastest speed; nothing of unequal planets."""
+    gears, housing = planetary_set(results.case), results.housing
+    N = gears.n_planets
+    if N < 2 or rotational_symmetry(replace(set_deviations(results.case), faults=()), gears) != N:
+        return
+    fastest = int(np.abs(housing["speed"].values).argmax())
+    order, carrier = housing["order"].values, abs(float(housing["carrier_speed"].values[fastest]))
+    size = np.hypot(housing["lines_real"].values[fastest], housing["lines_imag"].values[fastest]) * order**2
+    new = np.where(np.abs(order / N - np.round(order / N)) > 1e-6, size, 0.0)
+    line = int(new.argmax())
+    if not new[line] > _HEARD * size.max():
+        yield "no line at the sensor is new"
+        return
+    below = 20.0 * math.log10(size.max() / new[line])
+    hertz = order[line] * carrier / (2.0 * math.pi)
+    under = "the largest of all" if below < 0.05 else f"{below:.0f} dB below the largest"
+    yield f"new lines, at {hertz:,.0f} Hz {under}"
 
 
 def undrawn_faults(case: Any) -> Iterator[str]:

@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from femgear.case.load_spectrum import required_life
 from femgear.stages.judgements import (
+    FAULTY,
+    SMOOTH,
     Judgement,
     Least,
+    NotRated,
     judge_heat,
     judge_lives,
     judge_noise,
@@ -37,7 +41,13 @@ from femgear.stages.strength_results import (
     taken_as_one,
 )
 from femgear.stages.stress_reasons import largest_pressure
+from femgear.stages.tooth_faults import fault_effects, fault_words
 
+_TO_A_HOUSING = "femgear casing CASE makes a gearbox of it, in a casing with sensors"
+"""What gives a pair or a set of rigid bodies a level."""
+_NO_METHOD = NotRated("ISO 6336 has no safety of these teeth", "the verdict in numbers says why")
+_MOST_FAULTS = 3
+"""Faults that page one names."""
 _RESPONSES = "dynamics", "response", "runup", "branch"
 """Stages with motion."""
 
@@ -45,9 +55,24 @@ _RESPONSES = "dynamics", "response", "runup", "branch"
 def set_judgements(results: Any) -> Iterator[Judgement]:
     """Judge a pair or a set of rigid bodies, which has no housing."""
     rated = rate_results(results)
-    yield from judge_teeth(results, None if rated is None else rated[0])
-    yield judge_noise("no housing in this kind of case", "", open_words="femgear gearbox CASE makes one with sensors")
+    for judgement in judge_teeth(results, None if rated is None else rated[0]):
+        # nothing louder is said of a set without a level
+        smooth = judgement.question == SMOOTH and judgement.state == "good"
+        yield replace(judgement, sentence=f"It runs smoothly: {judgement.limit}") if smooth else judgement
+    yield judge_noise("no level: this kind of case has no housing", _largest_force(results), open_words=_TO_A_HOUSING)
     yield judge_numbers(results.findings, results.manifest.complete)
+
+
+def _largest_force(results: Any) -> str:
+    """Write how far mesh forces of the run-up reach over their mean, and at which speed; empty without a run-up."""
+    if "runup" not in results.stages or "dynamic_factor" not in results.runup:
+        return ""
+    factors = results.runup["dynamic_factor"].values
+    factors = factors.reshape(len(factors), -1).max(axis=1)
+    at = int(factors.argmax())
+    end = ", the end of the run-up" if at in (0, len(factors) - 1) else ""
+    where = f"at {results.runup['speed'].values[at]:,.4g} rpm{end}"
+    return f"Its mesh force reaches {factors[at]:.2f} times its mean ({where})"
 
 
 def judge_teeth(results: Any, rating: Rating | None, dynamic: np.ndarray | None = None) -> Iterator[Judgement]:
@@ -62,6 +87,7 @@ def judge_teeth(results: Any, rating: Rating | None, dynamic: np.ndarray | None 
         K_v of the kinds of mesh, by default those of dynamics.nc.
     """
     case, stages, findings = results.case, results.stages, results.findings
+    yield from _judge_faults(results)
     root, flank = (None, None) if rating is None else least_of(rating)
     if "life" in stages:
         root, flank = (least_over_life(results.life, *least) for least in (("root", root), ("flank", flank)))
@@ -74,7 +100,8 @@ def judge_teeth(results: Any, rating: Rating | None, dynamic: np.ndarray | None 
         findings,
         (*OF_ROOTS, *(() if all(least.over_life for least in shown) else OF_RESPONSE)),
         taken_as_one(_missing_factors(results, rating, shown)),
-        unrated=() if rating is None else unrated_gears(rating),
+        NotRated() if rating is None else _NO_METHOD,
+        () if rating is None else unrated_gears(rating),
     )
     if "life" in stages:
         parts = (*lives_of_teeth(results.life), *lives_of_bearings(results.life))
@@ -82,6 +109,22 @@ def judge_teeth(results: Any, rating: Rating | None, dynamic: np.ndarray | None 
         yield from judge_lives(parts, required_life(case.operation), findings, unknown)
     yield from judge_heat(results)
     yield judge_smoothness(_motion(results, dynamic), results, _RESPONSES)
+
+
+def _judge_faults(results: Any) -> Iterator[Judgement]:
+    """Say which teeth of a case are faulty, and what that does; nothing of whole teeth."""
+    faults = fault_words(results.case)
+    if faults:
+        effects = "; ".join(fault_effects(results))
+        answer = ", ".join(faults[:_MOST_FAULTS])
+        answer += f" and {len(faults) - _MOST_FAULTS} more" if len(faults) > _MOST_FAULTS else ""
+        sentence = ". ".join(filter(None, (f"Faulty: {answer}", _capital(effects))))
+        yield Judgement(FAULTY, "look", answer, "what it does stands above, what is left out in the warnings", sentence)
+
+
+def _capital(text: str) -> str:
+    """Begin a text with a capital letter."""
+    return f"{text[:1].upper()}{text[1:]}"
 
 
 def _missing_factors(results: Any, rating: Rating | None, shown: Sequence[Least]) -> list[str]:

@@ -298,6 +298,18 @@ def test_long_legends_leave_room_for_their_charts(opened):
     tab = opened(MANY_MESHES, unfold=False)
     names = tab.locator(".front .chart").last.locator(".legendtext").all_text_contents()
     assert len(names) <= 4 and names[-1].endswith(" more, which the pointer names")
+    assert (
+        tab.locator(".front figcaption")
+        .inner_text()
+        .endswith("The pointer names them. Drag or use arrow keys to turn.")
+    )
+    # no hand moves over paper
+    tab.evaluate("dispatchEvent(new Event('beforeprint'))")
+    front = tab.locator(".front")
+    assert "pointer" not in "".join(front.locator(".legendtext").all_text_contents())
+    assert (
+        front.locator(".legendtext").last.text_content().endswith(" more") and not front.locator(".hand").is_visible()
+    )
 
 
 @pytest.mark.parametrize("name", (*TRAINS, MANY_MESHES))

@@ -2,6 +2,7 @@
 
 from pathlib import Path
 
+import pytest
 from command_stand_ins import CASE
 
 from femgear import cli
@@ -42,7 +43,17 @@ def test_new_refuses_a_centre_distance_at_which_nothing_closes(tmp_path, capsys)
     assert "--centre-distance: no profile shifts close" in capsys.readouterr().err
 
 
-def test_a_gearbox_gets_a_casing_and_a_set_is_told_how_to(tmp_path, capsys):
+@pytest.mark.parametrize("name", ("spur_pair", "nrel_pga", "own_chain"))
+def test_pairs_sets_and_files_of_former_models_become_gearboxes_in_a_casing(name, tmp_path):
+    for path in CASE.parent.glob(f"{name}*"):
+        (tmp_path / path.name).write_bytes(path.read_bytes())
+    assert cli.main(["casing", str(tmp_path / f"{name}.toml")]) == 0
+    case = read_case(tmp_path / f"{name}_in_casing.toml")
+    assert case.train == "gearbox" and len(case.casing.foot) == 4 and len(case.sensor) >= 2
+    assert cli.main(["check", str(tmp_path / f"{name}_in_casing.toml")]) == 0
+
+
+def test_a_gearbox_gets_a_casing_and_a_set_with_a_sensor_none(tmp_path, capsys):
     box = tmp_path / "box.toml"
     assert cli.main(["new", "gearbox", "-o", str(box)]) == 0
     assert cli.main(["casing", str(box)]) == 0
@@ -50,4 +61,4 @@ def test_a_gearbox_gets_a_casing_and_a_set_is_told_how_to(tmp_path, capsys):
     case = read_case(tmp_path / "box_in_casing.toml")
     assert len(case.casing.foot) == 4 and len(case.sensor) == 3 and case.runup.count
     assert cli.main(["casing", str(CASE), "-o", str(tmp_path / "set.toml")]) == 2
-    assert "femgear gearbox" in capsys.readouterr().err
+    assert "levels are those at its sensors" in capsys.readouterr().err

@@ -256,5 +256,7 @@ def test_page_one_answers_the_questions_of_a_set(tmp_path):
     signs = {"good": ("✓", "holds"), "look": ("▲", "look"), "open": ("○", "no limit")}
     assert [signs[state] for state, *_ in states] == [(sign, word) for _, _, sign, word in states]
     sentence = re.search(r'<p class="sentence">(.*?)</p>', front)[1]
-    assert sentence.startswith("Its strength is not rated. At 3,100 rpm the housing has ")
+    assert sentence.startswith(
+        "Its strength is not rated: the case gives no treatment of its gears. At 3,100 rpm the housing has "
+    )
     assert '<p class="duty">100 N m at 250 to 3,100 rpm (sun) make 500 N m' in front

@@ -55,7 +55,10 @@ def test_a_set_turns_by_willis_and_keeps_its_power():
         {"operation.torque": "60 N m", "operation.speeds": ["1000 rpm"]},
     )
     power = in_digits(60.0 * 1000.0 * RPM * 1e-3)
-    assert set_duty(case) == f"60 N m at 1,000 rpm (sun) make 300 N m at 200 rpm (carrier): {power} kW, ratio 5."
+    assert (
+        set_duty(case) == f"60 N m at 1,000 rpm (sun) make 300 N m at 200 rpm (carrier): {power} kW, ratio 5, "
+        "teeth mesh at 360 Hz."
+    )
     back = with_values(case, {"operation.torque": "-60 N m"})
     assert set_duty(back).startswith("300 N m at 200 rpm (carrier) make 60 N m at 1,000 rpm (sun): ")
     assert "ratio 1:5" in set_duty(back)
@@ -63,9 +66,10 @@ def test_a_set_turns_by_willis_and_keeps_its_power():
 
 def test_a_pair_and_a_gearbox():
     assert pair_duty(read_case(CASES / "spur_pair.toml")) == (
-        "200 N m at 1,500 rpm (gear 1) make 300 N m at 1,000 rpm (gear 2): 31.4 kW, ratio 1.5."
+        "200 N m at 1,500 rpm (gear 1) make 300 N m at 1,000 rpm (gear 2): 31.4 kW, ratio 1.5, teeth mesh at 600 Hz."
     )
     case = read_case(CASES / "e_axle.toml")
     text = train_of(case).duty(case)
     # 72/25 of the pair, 1 + 73/23 of the set whose ring stands
-    assert f"ratio {72 / 25 * (1 + 73 / 23):.4g}, full torque, one of 2 load cases." in text
+    assert f"ratio {72 / 25 * (1 + 73 / 23):.4g}, teeth mesh at 3,750, " in text
+    assert text.endswith(" Hz, full torque, one of 2 load cases.")

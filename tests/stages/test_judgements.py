@@ -55,7 +55,7 @@ def test_strength_without_limits_is_open_and_half_of_it_deserves_a_look():
     assert half.state == "look" and half.limit.endswith("S_F is not rated")
     doubt = Finding("W-FACE-LOAD", "", "text", severity=DOUBT)
     doubtful = judge_strength(ROOT, FLANK, StrengthSection(), "", [doubt], ["W-FACE-LOAD"])
-    assert doubtful.state == "look" and doubtful.limit.endswith("; doubt: load over the width is coarse (W-FACE-LOAD)")
+    assert doubtful.state == "look" and doubtful.limit.endswith("; doubt: coarse load over the width")
     assert judge_strength(ROOT, FLANK, StrengthSection(), "", [doubt], ["W-THRUST"]).state == "good"
 
 
@@ -136,9 +136,7 @@ def test_lives_deserve_a_look_where_some_are_unknown_or_doubtful():
     doubt = Finding("W-STIFFNESS", "", "text")
     (doubtful,) = judge_lives(lives, 100.0, [doubt, Finding("W-TAIL", "", "of a response")])
     assert (
-        doubtful.state == "look"
-        and "doubt: estimated stiffness (W-STIFFNESS)" in doubtful.limit
-        and "W-TAIL" not in doubtful.limit
+        doubtful.state == "look" and "doubt: estimated stiffness" in doubtful.limit and "W-TAIL" not in doubtful.limit
     )
     assert [judgement.state for judgement in judge_lives(lives, 500.0, [doubt])] == ["bad"]
     names = xr.Dataset(coords={"root": ["gear 1", "planet, sun side"], "flank": ["planet, sun side", "gear 1, back"]})
@@ -203,7 +201,7 @@ def test_a_run_is_smooth_unless_teeth_part_or_motions_grow():
     short = judge_smoothness("", pulled, ("dynamics",))
     assert (short.state, short.answer) == (
         "look",
-        "mesh forces may change: too few harmonics or side bands were taken (W-TAIL)",
+        "mesh forces may change: too few harmonics or side bands were taken",
     )
     pulled.findings = (Finding("W-OPEN", "", "planet 2 carries nothing"),)
     unloaded = judge_smoothness("", pulled, ("dynamics",))
@@ -255,8 +253,8 @@ def test_numbers_are_judged_by_the_findings():
     judged = judge_numbers([doubt, fault, doubt], complete=True)
     assert (judged.state, judged.answer, judged.limit) == (
         "look",
-        "2 doubts",
-        "too few harmonics or side bands (W-TAIL)",
+        "1 doubt",
+        "too few harmonics (W-TAIL)",
     )
     # gears that fail say nothing against their numbers
     assert judge_numbers([fault], complete=True).state == "good"

@@ -3,9 +3,11 @@
 import math
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
+import xarray as xr
 
 from femgear.case import text as case_text
 from femgear.case.gear_set import planetary_set, set_deviations
@@ -19,8 +21,10 @@ from femgear.stages.static import solve_static
 from femgear.stages.tooth_faults import (
     archard_wear,
     describe_faults,
+    fault_effects,
     fault_findings,
     fault_frequencies,
+    fault_words,
     sun_fault_step,
     undrawn_faults,
 )
@@ -52,6 +56,59 @@ def test_faults_say_what_is_left_out(healthy):
     said, edge = texts(with_values(healthy, {"sun.fault": [spall]}))
     assert said.startswith("[W-FAULT] sun.fault[0]: a pit that only separates flanks")
     assert edge.startswith("[W-EDGE] sun.fault[0]: the flank has a sharp edge")
+
+
+def test_faults_are_named_by_gear_tooth_kind_and_size(healthy):
+    assert fault_words(healthy) == []
+    assert fault_words(read_case(CASES / "cracked_planet.toml")) == ["planet 1, tooth 3: crack of 1.5 mm"]
+    pit = {"kind": "spall", "tooth": 3, "flank": "left", "diameter": "42 mm", "length": "1 mm", "depth": "40 um"}
+    tips = {"kind": "broken corner", "tooth": 2, "length": "0.4 mm"}
+    case = with_values(
+        healthy,
+        {
+            "sun.fault": [pit, tips],
+            "planet.fault": [{"kind": "missing", "tooth": 5, "planet": 2}],
+            "ring.fault": [{"kind": "wear", "flank": "left", "depth": "5 um"}],
+        },
+    )
+    assert fault_words(case) == [
+        "sun, tooth 3: pit of 1 mm, 40 µm deep",
+        "sun, tooth 2: tip broken off by 0.4 mm",
+        "planet 2, tooth 5: missing",
+        "ring, all teeth: worn by 5 µm",
+    ]
+
+
+def test_effects_of_a_fault_are_those_of_its_mesh_periods():
+    """Four mesh periods, of which the second has the faulty tooth; a line between those of three equal planets."""
+    case = read_case(CASES / "cracked_planet.toml")
+    usual, faulty = np.array([0.0, 2e-6]), np.array([0.0, 3e-6])
+    ste = np.stack([np.concatenate([usual, faulty, usual, usual]), np.tile(0.5 * usual, 4)])
+    share = np.full((3, 8), 1.0 / 3.0)
+    share[:, 2] = 0.28, 0.36, 0.36
+    static = xr.Dataset(
+        {"ste": (("mesh", "position"), ste), "load_share": (("planet", "position"), share)},
+        {"mesh": ["sun-planet 1", "planet 1-ring"], "planet": [1, 2, 3]},
+        {"mesh_periods": 4},
+    )
+    # accelerations of 1 and 0.1 m/s^2: the line of order 4 is 20 dB below that of order 3
+    lines = {"lines_real": (("speed", "order"), [[0.0, 1.0 / 9.0, 0.1 / 16.0]])}
+    speeds = {"carrier_speed": ("speed", [20.0 * np.pi])}
+    zero = {"lines_imag": (("speed", "order"), np.zeros((1, 3)))}
+    housing = xr.Dataset(lines | zero | speeds, {"speed": [1000.0], "order": [0.0, 3.0, 4.0]})
+    run = SimpleNamespace(case=case, stages=("static", "housing"), static=static, housing=housing)
+    error, shares, line = fault_effects(run)
+    assert error == "transmission error 3 in place of 2 µm"
+    assert shares == "planet 1 carries 28.0% in place of 33.3% of the torque"
+    assert line == "new lines, at 40 Hz 20 dB below the largest"
+    housing["lines_real"][:, 2] = 0.0
+    static["ste"][0, 2:4] = usual
+    static["load_share"][:] = 1.0 / 3.0
+    assert list(fault_effects(run)) == [
+        "no mesh period has 2% more transmission error than the others",
+        "planets share the load as without it",
+        "no line at the sensor is new",
+    ]
 
 
 def test_a_fault_on_an_idle_flank_is_told(healthy):

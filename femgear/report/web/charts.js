@@ -152,7 +152,7 @@ page.shorten = (traces, count, most) => {
   const named = traces.filter((one) => one.showlegend).sort((a, b) => size(b) - size(a));
   named.slice(most - 1).forEach((one) => { one.showlegend = false; });
   const { xaxis, yaxis } = traces[0];
-  traces.push({ x: [null], y: [null], xaxis, yaxis, mode: "lines", line: { color: "rgba(0,0,0,0)" }, name: `${count - most + 1} more, which the pointer names` });
+  traces.push({ x: [null], y: [null], xaxis, yaxis, mode: "lines", line: { color: "rgba(0,0,0,0)" }, name: `${count - most + 1} more${document.documentElement.classList.contains("paper") ? "" : ", which the pointer names"}` });
   return most;
 };
 

@@ -8,15 +8,17 @@ from typing import Any
 import numpy as np
 
 from femgear.case.level_limits import limit_at
-from femgear.findings import in_words
+from femgear.findings import CATALOGUE
 from femgear.report.tables import Marks, is_bound, level_change_at
 from femgear.stages.assumptions import most_decisive
 from femgear.stages.judgements import (
+    CLEAR,
     MAKES_LEVEL,
     NEAR_RESONANCE,
     Judgement,
     LevelMargin,
     doubt_words,
+    estimates_words,
     judge_noise,
     judge_numbers,
     margins_of_levels,
@@ -75,8 +77,9 @@ def _noise(results: Any) -> Judgement:
         line_words += f" at {hertz:,.0f} Hz"
         resonance = resonance_of_line(line_words, hertz, results.modes["frequency"].values, share)
     # a bound has no mark: it is one itself
-    doubts = [*([in_words("W-EXCITATION")] if any(map(is_bound, levels)) else []), *marks.codes]
-    return judge_noise(answer, sentence, resonance, margins=margins, doubts=doubt_words(doubts))
+    doubts = [*([CATALOGUE["W-EXCITATION"].words] if any(map(is_bound, levels)) else []), *marks.words]
+    open_words = f"{CLEAR}{estimates_words(results.findings)}"
+    return judge_noise(answer, sentence, resonance, open_words, margins, doubt_words(doubts))
 
 
 def _margins(results: Any) -> Iterator[LevelMargin]:

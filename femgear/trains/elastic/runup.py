@@ -305,7 +305,7 @@ def loudest(data: xr.Dataset, marks: Marks) -> str:
         raised = 20.0 * np.log10(level / level[worst]) + changes
     change = float(changes[worst] if np.isnan(raised).any() else max(raised.max(), changes[worst]))
     text = shown_level(level[worst], change, marks, "W-STEPS", *_RUN_UP_DOUBTS, of=("runup",))
-    return f"{text} m/s² at {speed[worst]:.6g} rpm{end}"
+    return f"{text} m/s² at {speed[worst]:,.4g} rpm{end}"
 
 
 def largest_factors(data: xr.Dataset, marks: Marks) -> str:

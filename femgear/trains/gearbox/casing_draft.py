@@ -41,7 +41,14 @@ def draft_casing(case: GearboxCase) -> tuple[str, tuple[Finding, ...]]:
     if case.casing is not None or case.sensor:
         key = "casing" if case.casing is not None else "sensor"
         limit = "a gearbox without [casing] and [[sensor]]"
-        raise CaseError("the case has it already", code="E-CHOICE", key=key, limit=limit, file=case.location(key))
+        raise CaseError(
+            "the case has it already",
+            code="E-CHOICE",
+            key=key,
+            limit=limit,
+            remedy="run it as it is: levels are those at its sensors",
+            file=case.location(key),
+        )
     low, high = _bounds(case)
     wall = wall_thickness(case)
     low, high = low - _GAP * wall, high + _GAP * wall

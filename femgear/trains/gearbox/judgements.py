@@ -15,6 +15,7 @@ from femgear.stages.judgements import (
     Judgement,
     Least,
     LevelMargin,
+    NotRated,
     doubt_words,
     judge_heat,
     judge_lives,
@@ -72,9 +73,10 @@ def _strength(results: Any) -> Judgement:
     if shown and all(not least.over_life and safety and safety[1][0] == chosen for least, safety in shown):
         missing -= {"dynamic"}  # the response is one of the chosen load case
     with_teeth = [stage.name for stage in (*case.pair, *case.planetary) if stage.teeth]
-    remedy = "no stage has teeth, which safeties are of"
+    without = NotRated("no stage has teeth", f"give the teeth of {_stages_words(case)} with treatment and hardness")
     if with_teeth:
-        remedy = f"give treatment and hardness in the material of the teeth of {merged_names(with_teeth)}"
+        of_stages = f"the material of the teeth of {merged_names(with_teeth)}"
+        without = NotRated("no teeth have a treatment", f"give treatment and hardness in {of_stages}")
     return judge_strength(
         root,
         flank,
@@ -83,9 +85,16 @@ def _strength(results: Any) -> Judgement:
         results.findings,
         OF_ROOTS,
         taken_as_one(name for name in SYMBOLS if name in missing),
-        remedy,
+        without,
         _listed(data, "iso_unrated"),
     )
+
+
+def _stages_words(case: Any) -> str:
+    """Name the tables of the stages of a gearbox: ``planetary stage 1..4``."""
+    tables = {"pair": case.pair, "planetary": case.planetary}
+    parts = (f"{key} {merged_names([stage.name for stage in stages])}" for key, stages in tables.items() if stages)
+    return " and ".join(parts) or "its stages"
 
 
 def _listed(data: Any, name: str) -> list[str]:
@@ -122,13 +131,22 @@ def _motion(results: Any) -> str:
     if "dynamics" in results.stages:
         factors = results.dynamics["dynamic_factor"].values
         if np.isfinite(factors).any():
-            parts.append(f"K_v {np.nanmax(factors):.2f}")
+            parts.append(f"K_v {np.nanmax(factors):.2f}{_longer(results)}")
     elif "balance" in results.stages:
         mean, largest = (results.balance[name].values for name in ("mean_force", "largest_force"))
         carries = mean > _IDLE * largest.max()
         if carries.any():
             parts.append(f"largest mesh force {(largest[carries] / mean[carries]).max():.3f} of its mean")
     return ", ".join(parts)
+
+
+def _longer(results: Any) -> str:
+    """Write the largest dynamic factor that a longer excitation gives, where forces change by it; empty else."""
+    doubtful = any(finding.code == "W-TAIL" and finding.stage == "dynamics" for finding in results.findings)
+    if not doubtful or "longer_dynamic_factor" not in results.dynamics:
+        return ""
+    factors = results.dynamics["longer_dynamic_factor"].values
+    return f" ({np.nanmax(factors):.2f} with more harmonics)" if np.isfinite(factors).any() else ""
 
 
 def _largest_force(results: Any) -> str:
@@ -146,7 +164,9 @@ def _unheard(results: Any) -> Judgement:
     """Say why a gearbox has no level at sensors, and what would give one."""
     case, forces = results.case, _largest_force(results)
     if not case.sensor:
-        open_words = "femgear casing CASE gives a gearbox a casing with sensors"
+        open_words = "femgear casing CASE gives it a casing with sensors"
+        if case.motions == "rotation":
+            open_words = f'shafts that rotate alone shake nothing: with bearings and motions = "plane" {open_words}'
         return judge_noise("no sensor in this run", forces, open_words=open_words)
     why = why_silent(case) or "its response was not computed"
     return judge_noise("no level at its sensors", forces, open_words=why)
@@ -177,7 +197,7 @@ def _noise(results: Any) -> Judgement:
         sentence += f". Loudest of the run-up: {_loudest_of_run_up(results.runup, marks, name)}"
     open_words = "give sensor.level_limit, or femgear compare sets two runs beside one another"
     margins = tuple(_margins(results))
-    return judge_noise(answer, sentence, resonance, open_words, margins, doubt_words(marks.codes))
+    return judge_noise(answer, sentence, resonance, open_words, margins, doubt_words(marks.words))
 
 
 def _marked(level: float, marks: Marks, stage: str) -> str:

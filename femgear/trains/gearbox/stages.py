@@ -15,7 +15,7 @@ from femgear.case.quantities import RPM
 from femgear.errors import CaseError
 from femgear.report.tables import Block, merged_names, tabulate
 from femgear.stages.drawing_tables import describe_drawing
-from femgear.stages.duty import ShaftEnd, duty_sentence
+from femgear.stages.duty import ShaftEnd, duty_sentence, in_digits
 from femgear.stages.protocol import FiguresOf, Progress, Stage, Train, modes_verdict, one_blas_thread, silent
 from femgear.stages.wear import MeshingTeeth
 from femgear.trains.gearbox.balance import (
@@ -80,6 +80,9 @@ from femgear.trains.gearbox.stress import (
 from femgear.trains.gearbox.transient_checks import check_spectrum, check_transient, why_no_motion
 from femgear.trains.gearbox.transient_results import TransientResult, describe_spectrum, describe_transient
 from femgear.trains.gearbox.verdict import gearbox_verdict
+
+_MOST_MESHES = 4
+"""Mesh frequencies that the sentence of page one names."""
 
 
 @one_blas_thread()
@@ -208,7 +211,12 @@ def gearbox_duty(case: GearboxCase) -> str:
     load_cases, shafts = case.operation.load_case, port_shafts(case)
     flow = gearbox_flow(case, case.load_case)
     ends = [ShaftEnd(name, torque, (flow.speed[shafts[name]],)) for name, torque in flow.port_torque.items()]
-    return duty_sentence(ends, f"{case.load_case.name}, one of {len(load_cases)} load cases" if load_cases[1:] else "")
+    if not any(end.torque for end in ends):
+        return "No torque acts: its modes alone are known."
+    hertz = dict.fromkeys(in_digits(abs(frequency)) for frequency in flow.mesh_frequency.values() if frequency)
+    facts = [f"teeth mesh at {', '.join(hertz)} Hz"] if 0 < len(hertz) <= _MOST_MESHES else []
+    facts += [f"{case.load_case.name}, one of {len(load_cases)} load cases"] if load_cases[1:] else []
+    return duty_sentence(ends, ", ".join(facts))
 
 
 def _flow_blocks(case: GearboxCase, load_case: LoadCaseSection) -> Iterator[Block]:

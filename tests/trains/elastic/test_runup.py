@@ -302,7 +302,7 @@ def test_the_verdict_says_where_the_run_up_ends(case, files):
     housing["excitation_limit"] = 12 * files["dynamics"]["mesh_frequency"]
     runup.attrs["method"] = "supports"
     rows, notes = told_of(case, files | {"runup": runup, "housing": housing})
-    assert rows["largest level of the run-up"] == "999 m/s² at 3500 rpm, the end of its range"
+    assert rows["largest level of the run-up"] == "999 m/s² at 3,500 rpm, the end of its range"
     assert "in the housing that stands still" in describe_runup(runup).notes[-1] and "mesh harmonics" not in notes
     fast = 12 * 1116.0 / 1e3
     points = list(verdict(results_of(case, files | {"runup": runup, "housing": housing})))[1]
