@@ -283,7 +283,7 @@ CATALOGUE = {
     ),
     "W-ONE-WAY": Meaning(
         NOTE,
-        "Supports or a casing change the level that load factors are computed without.",
+        "Supports or a casing change the level; load factors are computed without them.",
         "casing not in load factors",
         "Read K_gamma and mesh forces as those without the casing.",
     ),

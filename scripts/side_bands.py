@@ -305,7 +305,7 @@ def _checked_tolerance(tolerance: float, step: float) -> float:
 
 def _print_set(known: HeardSet) -> None:
     g, angles = spacing_symmetry(known.angles), ", ".join(f"{math.degrees(one):.5g}" for one in known.angles)
-    rule = f"alike, they make multiples of {g} alone" if g > 1 else "no order is forbidden"
+    rule = f"planets that are alike make only multiples of {g}" if g > 1 else "no order is forbidden"
     print(f"{known.ring} ring teeth, planets at {angles} deg: {rule}")
 
 

@@ -34,7 +34,7 @@ def explain(code: str, /) -> int:
         say(f"{name}, {meaning.words}: {meaning.sentence}")
         say(f"A warning, which ends nothing. Severity: {meaning.severity}, {severities[meaning.severity]}.")
         say(f"What to do: {meaning.advice}")
-        say("The warning itself has numbers, and the entry of the case file where one draws it.")
+        say("The warning of a run has its numbers, and names the entry of the case file that it concerns.")
     elif name in CODES:
         say(f"{name}: {CODES[name]}")
         say("A refusal: nothing was computed. Its message has entry, value, limit and remedy.")
