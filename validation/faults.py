@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 from scipy.sparse import block_diag, coo_array, csc_array, csr_array
 
+from femgear.case.dependencies import Steps
 from femgear.contact.assembly import contact_candidates
 from femgear.contact.batch import solve_with_cracks
 from femgear.contact.bodies import Bodies, Sector, flank_load_columns, flank_stations, make_bodies, make_sectors
@@ -21,6 +22,7 @@ from femgear.contact.cracked_flanks import (
     flanks_of_grids,
 )
 from femgear.contact.cycle import walk_mesh_cycle
+from femgear.contact.mesh_cycle import MeshCycle
 from femgear.contact.windows import first_windows, mesh_windows
 from femgear.fe.compliance import boundary_nodes, node_dofs, symmetric_factor
 from femgear.fe.cracks import SplitGrid, WholeSchur, condense_whole, cracked_ring, split_grid
@@ -32,6 +34,7 @@ from femgear.gears.faults import LEFT, Crack, Spall, Wear
 from femgear.gears.gear import Gear
 from femgear.gears.kinematics import speeds
 from femgear.gears.planetary import close_set, equal_planet_angles
+from femgear.stages.static import solve_static
 from femgear.stages.tooth_faults import fault_frequencies
 from femgear.study.wear import WearRequest, wear_of_case
 from femgear.trains.reading import read_case, with_values
@@ -305,6 +308,29 @@ def over_one_another() -> tuple[Row, ...]:
         )
         for words, name in (("arc of the sun", "sun_arc"), ("loads of tooth pairs", "tooth_load"))
     )
+
+
+def spalls_in_slices() -> tuple[Row, ...]:
+    """Contact of a pair with a spall in all slices of the width beside one across it, and with ever narrower ones."""
+    coarse = {"static.flank_elements": 4, "static.positions": 8, "static.stresses": False, "static.slices": 5}
+    case, steps = with_values(read_case(CASES / "spur_pair.toml"), coarse), Steps()
+    spall = {"kind": "spall", "tooth": 3, "flank": "left", "diameter": "72.9 mm", "length": "1 mm", "depth": "40 um"}
+
+    def contact(*faults: dict[str, str]) -> MeshCycle:
+        return solve_static(with_values(case, {"gear_1.fault": list(faults)}), steps=steps).cycle
+
+    across, in_slices = contact(spall), contact(spall | {"width": "19.9 mm"})
+    rows, healthy = list[Row](), float(contact().deflection.max())
+    for words, name in (("deflection", "deflection"), ("loads of slices", "slice_load")):
+        values, other = getattr(across, name), getattr(in_slices, name)
+        text = f"spall of 19.9 of 20 mm in 5 slices: {words}, largest difference over the largest"
+        missed = np.abs(values - other).max() / np.abs(values).max()
+        rows.append(at_most("spall in slices", "the spall across the width", text, 1e-9, missed))
+    effects = [float(across.deflection.max()) - healthy]
+    effects += [float(contact(spall | {"width": f"{4 * count} mm"}).deflection.max()) - healthy for count in (3, 1)]
+    fading = int(effects[0] > effects[1] > effects[2] > 0.0)
+    text = "largest deflection by a spall over 5, 3 and 1 of 5 slices falls (yes 1)"
+    return *rows, counted("spall in slices", "none is left of a spall without width", text, 1, fading)
 
 
 def wear_at_constant_load() -> tuple[Row, ...]:

@@ -370,7 +370,7 @@ THEMES = (
         "Compared with: the whole matrix of all cuts; one grid of all teeth; the healthy gear where nothing parts; the "
         "energy release rate by J in two domains; published frequencies of a set 17/37/91; formulas of the orders; "
         "gates: 1e-12; 1 %; every bit; 2 %; printed digits; 1e-9 of the largest line; 3 % of a gearbox beside the set; "
-        "0.01 orders; 0.2 dB; gaps by hand 1e-9; "
+        "0.01 orders; 0.2 dB; gaps by hand 1e-9; spalls in slices 1e-9; "
         "Archard's law in closed form 1e-6.",
         (faults.frequencies, faults.energy_release),
         (
@@ -378,6 +378,7 @@ THEMES = (
             faults.update_identity,
             faults.one_grid,
             faults.over_one_another,
+            faults.spalls_in_slices,
             faults.wear_at_constant_load,
             fault_orders.orders_of_sets,
             fault_orders.orders_of_stages,

@@ -41,12 +41,12 @@ _Points = Values(max_length=MOST_POINTS)
 _ENTRIES = {
     "missing": (),
     "broken corner": ("length",),
-    "spall": ("flank", "diameter", "length", "depth"),
+    "spall": ("flank", "diameter", "length", "depth", "width", "offset"),
     "wear": ("flank", "depth", "depths", "diameters"),
     "crack": ("flank", "angle", "depth", "diameter"),
 }
 """Entries of every kind beside the tooth."""
-_OPTIONAL = {"wear": ("depth", "depths", "diameters"), "crack": ("diameter", "angle")}
+_OPTIONAL = {"wear": ("depth", "depths", "diameters"), "crack": ("diameter", "angle"), "spall": ("width", "offset")}
 """Those that may be left out; wear needs some of them."""
 CRACK_ANGLE = math.radians(70.0)
 """Between a crack and the centre line of its tooth, where none is given."""
@@ -58,9 +58,10 @@ _SIDES = {"left": LEFT, "right": RIGHT, "sun side": LEFT, "ring side": RIGHT}
 class FaultSection(Section):
     """A fault of one tooth; ``tooth`` counts counter-clockwise from 0 as pitch errors do.
 
-    A spall is ``length`` long along the flank about its ``diameter`` and ``depth`` deep; of a broken corner ``length``
-    is what is broken off the tip, radially. A crack is straight, from a ``diameter`` in the root of its flank, at an
-    ``angle`` to the centre line of the tooth; ``depth`` is its length. All go across the whole width. Wear has one
+    A spall is ``length`` long along the flank about its ``diameter`` and ``depth`` deep; it goes across the whole face
+    width, or over a ``width`` whose middle is off that of the face by ``offset``. Of a broken corner ``length`` is what
+    is broken off the tip, radially. A crack is straight, from a ``diameter`` in the root of its flank, at an ``angle``
+    to the centre line of the tooth; ``depth`` is its length. All others go across the whole width. Wear has one
     ``depth``, or ``depths`` over ``diameters``, and without ``tooth`` it is that of all teeth.
     """
 
@@ -70,6 +71,8 @@ class FaultSection(Section):
     diameter: Diameter | None = None
     length: _Length | None = None
     depth: _Depth | None = None
+    width: _Length | None = None
+    offset: Annotated[float, Quantity(LENGTH, -0.5, 0.5)] | None = None
     angle: Annotated[float, Quantity(ANGLE, 0.0, math.radians(120))] | None = None
     depths: Annotated[tuple[_Depth, ...], _Points] | None = None
     diameters: Annotated[tuple[Diameter, ...], _Points] | None = None
@@ -85,6 +88,9 @@ class FaultSection(Section):
         if missing := [name for name in needed if getattr(self, name) is None]:
             message = f"a fault of kind {self.kind!r} needs {' and '.join(missing)}"
             raise CaseError(message, code="E-KEY-MISSING", remedy=f"give {', '.join(missing)}")
+        if self.offset is not None and self.width is None:
+            message, remedy = "an offset needs the width of the spall", 'give width, as in width = "5 mm"'
+            raise CaseError(message, code="E-KEY-MISSING", remedy=remedy)
         if self.kind == "wear":
             _check_depths(self)
         return self
@@ -165,7 +171,7 @@ def _fault(section: FaultSection, gears: GearSet, number: int) -> ToothFault:
         case "broken corner":
             return _broken_tip(section, gear, place)
         case "spall":
-            return _spall(section, gear, place)
+            return _spall(section, gear, place, _across(section, gear, min(gears.mesh_widths)))
         case "crack":
             assert section.depth is not None
             start = None if section.diameter is None else 0.5 * section.diameter
@@ -195,7 +201,29 @@ def _broken_tip(section: FaultSection, gear: Gear, place: dict[str, Any]) -> Bro
     return BrokenTip(**place, roll=_roll(gear, radius), internal=gear.internal)
 
 
-def _spall(section: FaultSection, gear: Gear, place: dict[str, Any]) -> Spall:
+def _across(section: FaultSection, gear: Gear, face_width: float) -> tuple[float, float] | None:
+    """Find where a spall begins and ends over the face width that meshes [m], as shares of it; None: all of it."""
+    if section.width is None:
+        return None
+    offset, half = section.offset or 0.0, 0.5 * section.width
+    if abs(offset) + half > 0.5 * face_width + _ON_END * gear.module:
+        most = 2.0 * max(0.5 * face_width - abs(offset), 0.0)
+        raise GeometryError(
+            f"{gear.name}: the spall reaches beyond the face width that meshes",
+            code="E-FAULT",
+            key="width",
+            value=_mm(section.width),
+            limit=f"up to {_mm(most)} at this offset; teeth mesh over {_mm(face_width)}",
+            remedy="reduce width or offset, or leave both out for a spall across all",
+        )
+    if 2.0 * half > face_width - _ON_END * gear.module:
+        return None
+    return (offset - half) / face_width, (offset + half) / face_width
+
+
+def _spall(
+    section: FaultSection, gear: Gear, place: dict[str, Any], across: tuple[float, float] | None = None
+) -> Spall:
     """Pit about a diameter: of its ends half of its length along the involute lies to each side."""
     assert section.diameter is not None and section.length is not None and section.depth is not None
     radii = sorted((gear.form_radius, gear.tip_radius))
@@ -215,7 +243,7 @@ def _spall(section: FaultSection, gear: Gear, place: dict[str, Any]) -> Spall:
     # of a tooth that is thinnest at its tip
     thinnest = math.hypot(gear.base_radius, min(high, gear.tip_roll) if not gear.internal else max(low, gear.tip_roll))
     _check_thickness(gear, thinnest, section.depth, "depth", "the spall")
-    return Spall(**place, low=float(low), high=float(high), depth=section.depth)
+    return Spall(**place, low=float(low), high=float(high), depth=section.depth, across=across)
 
 
 def _check_on_flank(gear: Gear, middle: float, length: float) -> None:

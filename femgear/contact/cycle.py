@@ -109,7 +109,8 @@ class CycleOptions:
     slices : int
         Their number.
     ahead : (slices,) array, optional
-        By how much the slices of helical teeth run ahead of mid-width [mesh periods].
+        By how much the slices of helical teeth run ahead of mid-width [mesh periods]; zeros of spur teeth whose
+        flanks are not alike in all slices, each of which has windows of its own then.
     width_supports : WidthSupports
         What holds members against tilting and twisting in slices.
     peaks : bool
@@ -135,6 +136,11 @@ class CycleOptions:
     peaks: bool = False
     friction: tuple[float, ...] | None = None
     progress: Callable[[int, int], None] | None = None
+
+    @property
+    def helical(self) -> bool:
+        """Whether slices stand at other places of the mesh period than mid-width."""
+        return self.ahead is not None and bool(np.any(self.ahead))
 
     def mirrored(self, order: np.ndarray) -> CycleOptions:
         """The options of the mirror image, whose planets have this order (N,) in the original."""
@@ -215,7 +221,7 @@ def walk_mesh_cycle(
             solved, bodies, abs(sun_torque), deviations, supports, record, options, not np.ndim(positions)
         )
         record = loaded if loaded.force.any() else record
-    if options.ahead is not None and not np.ndim(positions):
+    if options.helical and options.ahead is not None and not np.ndim(positions):
         record = replace(record, **over_slices(record, options.ahead, periods=periods))
         pins = pin_forces(solved, record.force, record.back_force, record.friction_force)
         record = replace(record, bearing_force=pins)
@@ -259,7 +265,7 @@ def _under_load(
         repeats=repeats,
         turns=turns,
     )
-    peaks = options.peaks and options.ahead is None and equidistant
+    peaks = options.peaks and not options.helical and equidistant
     attempt = walk.attempt_with_peaks if peaks else walk.attempt
     return in_windows(attempt, *first_windows(gears, bodies, torque))
 
@@ -300,7 +306,7 @@ def cycle_without_load(
         contact=contact,
         unknowns=0,
         message="no torque: no tooth carries load and the mesh stiffness is zero",
-        helical=options.ahead is not None,
+        helical=options.helical,
         **values,
     )
 
@@ -464,7 +470,7 @@ class _Walk:
     def _different(self, share: float, nearest: float) -> tuple[np.ndarray, np.ndarray]:
         """Positions in different states, and which of them all repeat, see `different_positions`."""
         every = np.arange(len(self.empty.position))
-        if self.empty.periods == 1 or self.options.ahead is not None or self.options.both_flanks:
+        if self.empty.periods == 1 or self.options.helical or self.options.both_flanks:
             return every, every
         windows = {"share": share, "nearest": nearest, "contact": self.empty.contact}
         return different_positions(self.sector, self.bodies, self.deviations, self.empty.position, **windows)
@@ -574,7 +580,7 @@ class _Walk:
         load[setup.driver] = self.sun_torque / self.planetary_set.gears[0].base_radius / self.images
         candidates, state = solve_with_cracks(candidates, load, self.springs)
         check_residual(candidates, state)
-        values = {} if self.empty.helical else self._at_positions(candidates, state)
+        values = {} if options.ahead is not None else self._at_positions(candidates, state)
         overflow, nearest = candidates.touches_window_end(state.active), 0.0
         if self.width is None:
             approach, force = values["deflection"], state.loads.sum(axis=-1)

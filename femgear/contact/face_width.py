@@ -47,7 +47,7 @@ class FaceWidth:
     held : Bodies and WidthWaves, optional
         Other bodies with the same flanks, for whose tangents the contact is taken too.
     helical : bool
-        Whether every slice is at a position of its own.
+        Whether every slice is at a position of its own, or has flanks of its own there.
     """
 
     waves: WidthWaves

@@ -243,12 +243,13 @@ def profile_form(
     back: bool,
     tooth: np.ndarray | None = None,
     turns: np.ndarray | None = None,
+    slices: int = 1,
 ) -> Callable | None:
     """Separation [m] by deviations of the profiles as a function of both roll lengths [m], or None.
 
     `kind` is that of the mesh, 0 for sun-planet and 1 for planet-ring. With the teeth (2, meshes, pairs) of all
     meshes in the first mesh period and the periods passed (P,) faults of teeth count; roll lengths then are (meshes of
-    the kind, P, pairs, n).
+    the kind, P, pairs, n). So many ``slices`` of the width at a time have positions of their own.
     """
     if deviations is None:
         return None
@@ -258,7 +259,8 @@ def profile_form(
             lambda roll_1, roll_2: profile_separation(deviations, planetary_set, kind, roll_1, roll_2, back=back)
         )
     if deviations.faults and tooth is not None and turns is not None:
-        faulty = fault_form(deviations.faults, planetary_set, kind, *_met(planetary_set, kind, back, tooth, turns))
+        met = _met(planetary_set, kind, back, tooth, turns)
+        faulty = fault_form(deviations.faults, planetary_set, kind, *met, slices)
         forms += [faulty] if faulty else []
     if len(forms) < 2:
         return forms[0] if forms else None

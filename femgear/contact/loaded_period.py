@@ -151,7 +151,7 @@ def loaded_period(
     parts = (shift / periods).denominator
     first = -(-positions * periods // parts)
     # the end of the part is there to see jumps before it, and then left out; slices of helical teeth have none
-    looked = first + (options.ahead is None)
+    looked = first + (not options.helical)
     wanted, record, helical = np.arange(looked) / (first * parts) * periods, {}, False
     while len(wanted):
         if periods > 1:
@@ -184,7 +184,7 @@ def loaded_period(
         shares = (smooth, 0.5), (jumps, 0.25), (jumps, 0.5), (jumps, 0.75)
         wanted = np.concatenate([tau[gaps_there] + share * gap[gaps_there] for gaps_there, share in shares])
     added = _whole_period(planetary_set, record, symmetry, shift, periods)
-    if options.ahead is None:
+    if options.ahead is None or not options.helical:
         return added
     return replace(added, **over_slices(added, options.ahead, periods=periods))
 

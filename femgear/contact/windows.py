@@ -221,6 +221,7 @@ def mesh_windows(  # noqa: PLR0913
         those of flanks there, to which approaches by all motions still come. Approaches of gear 2 are exact anyway.
     """
     tau, turns = in_mesh_periods(cycle_positions(positions))
+    slices = np.shape(positions)[1] if np.ndim(positions) > 1 else 1
     pairs = mesh_pairs(planetary_set)
     widths = [
         WIDTH * _contact_half_width(pair, share / width, modulus)
@@ -245,7 +246,7 @@ def mesh_windows(  # noqa: PLR0913
                 "cells": cells,
                 "nearest": nearest,
                 "line_of_action": contact == "line_of_action",
-                "form": profile_form(planetary_set, deviations, kind, direction < 0, tooth, turns),
+                "form": profile_form(planetary_set, deviations, kind, direction < 0, tooth, turns, slices),
                 "whole": profile_form(planetary_set, whole, kind, direction < 0, tooth, turns),
                 "limits": pair_limits(planetary_set, deviations, contact_pair, kind, direction < 0, tooth, turns),
                 "moved": 0.0 if moved is None else moved[rows],

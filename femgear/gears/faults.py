@@ -19,6 +19,8 @@ if TYPE_CHECKING:
 
 LEFT, RIGHT = 0, 1
 """Flanks of a tooth."""
+_ROUNDED = 1e-9
+"""Share of the face width that is rounding."""
 
 
 @dataclass(frozen=True)
@@ -88,7 +90,7 @@ class BrokenTip(ToothFault):
 
 @dataclass(frozen=True)
 class Spall(ToothFault):
-    """A pit across the whole width: a part of the flank that stands back.
+    """A pit: a part of the flank that stands back.
 
     Parameters
     ----------
@@ -96,11 +98,20 @@ class Spall(ToothFault):
         Roll lengths of its ends [m].
     depth : float
         Along the normal [m].
+    across : (float, float), optional
+        Where it begins and ends over the face width, from -0.5 to 0.5 of it along z; by default it goes across all.
     """
 
     low: float
     high: float
     depth: float
+    across: tuple[float, float] | None = None
+
+    def in_slices(self, count: int) -> np.ndarray:
+        """Tell of equal slices (count,) of the width, along z, whether their middles lie in it."""
+        low, high = self.across or (-0.5, 0.5)
+        middle = (np.arange(count) + 0.5) / count - 0.5
+        return (middle >= low - _ROUNDED) & (middle <= high + _ROUNDED)
 
     def removed(self, roll: np.ndarray) -> np.ndarray:
         return np.where((roll >= self.low) & (roll <= self.high), self.depth, 0.0)
@@ -196,7 +207,12 @@ def fault_periods(faults: Sequence[ToothFault], gear: int, teeth: int) -> int:
 
 
 def fault_form(
-    faults: Sequence[ToothFault], gears: GearSet, kind: int, tooth: np.ndarray, sides: np.ndarray
+    faults: Sequence[ToothFault],
+    gears: GearSet,
+    kind: int,
+    tooth: np.ndarray,
+    sides: np.ndarray,
+    slices: int = 1,
 ) -> Callable | None:
     """Separation [m] by the faults of teeth as a function of both roll lengths [m], or None.
 
@@ -212,13 +228,16 @@ def fault_form(
         Numbers of the teeth on gear 1 and gear 2 of the meshes of this kind.
     sides : (2, meshes) int array
         Flanks with which both gears touch in these meshes.
+    slices : int
+        Of the face width: so many positions in succession are those of its slices, from -z to z.
 
     Returns
     -------
     callable
         Of roll lengths (meshes, P, pairs, n) on gear 1 and gear 2.
     """
-    acting = list(_acting([fault for fault in faults if fault.separates], gears, kind, tooth, sides))
+    separating = [fault for fault in faults if fault.separates]
+    acting = list(_acting(separating, gears, kind, tooth, sides, slices))
     if not acting:
         return None
 
@@ -266,7 +285,7 @@ def flank_limits(
 
 
 def _acting(
-    faults: Sequence[Fault], gears: GearSet, kind: int, tooth: np.ndarray, sides: np.ndarray
+    faults: Sequence[Fault], gears: GearSet, kind: int, tooth: np.ndarray, sides: np.ndarray, slices: int = 1
 ) -> Iterator[tuple[Fault, int, np.ndarray]]:
     """Faults that meet in meshes of a kind: on gear 1 (0) or gear 2 (1), and at which (meshes, P, pairs)."""
     meshes = [mesh for mesh in gears.meshes if mesh.kind == kind]
@@ -279,5 +298,7 @@ def _acting(
                 if same and fault.flank in (None, sides[place, row]):
                     teeth = gears.gears[body.gear].teeth
                     on[row] = fault.tooth is None or (tooth[place, row] - fault.tooth) % teeth == 0
+            if isinstance(fault, Spall) and fault.across and slices > 1:
+                on &= fault.in_slices(slices)[np.arange(on.shape[1]) % slices, None]
             if on.any():
                 yield fault, place, on

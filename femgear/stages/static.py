@@ -27,6 +27,7 @@ from femgear.case.dependencies import (
     static_entries,
     stress_entries,
 )
+from femgear.case.fault_sections import keyed_faults
 from femgear.case.flank_sections import OVER_WIDTH
 from femgear.case.gear_set import (
     material_of,
@@ -74,7 +75,7 @@ from femgear.errors import LESS_TORQUE, CaseError, ContactError
 from femgear.fe.elasticity import foundation
 from femgear.fe.grid import Grid
 from femgear.gears.deviations import SetDeviations, common_period
-from femgear.gears.faults import Crack
+from femgear.gears.faults import Crack, Spall
 from femgear.gears.iso6336_root import root_face_width
 from femgear.gears.kinematics import speeds
 from femgear.gears.pair import GearSet
@@ -397,7 +398,17 @@ def check_slices(case: Any, gears: GearSet) -> None:
                         file=case.location(key),
                         remedy=f"give static.slices = {needed}",
                     )
+        for key, spall in narrow_spalls(case):
+            raise CaseError(
+                "a spall over a part of the face width needs slices over the width",
+                code="E-SLICES",
+                key=f"{key}.width",
+                file=case.location(f"{key}.width"),
+                limit=f"static.slices of {_fewest_slices(spall)} or more",
+                remedy=(f"give static.slices = {max(needed, _fewest_slices(spall))}", "leave its width out"),
+            )
         return
+    _check_narrow_spalls(case, count, most)
     try:
         tilting_members(gears, width_supports(case, gears), count)
     except ContactError as error:
@@ -419,6 +430,34 @@ def check_slices(case: Any, gears: GearSet) -> None:
             remedy=f"use at most {most} slices{other}",
             **where,
         )
+
+
+def narrow_spalls(case: Any) -> list[tuple[str, Spall]]:
+    """List the spalls of a case that go over a part of the face width, with their entries."""
+    keyed = keyed_faults(case, planetary_set(case))
+    return [(key, fault) for key, fault in keyed if isinstance(fault, Spall) and fault.across]
+
+
+def _fewest_slices(spall: Spall) -> int:
+    """Fewest slices of which the middle of one lies in a spall wherever it is."""
+    low, high = spall.across or (-0.5, 0.5)
+    return max(math.ceil(1.0 / (high - low) - 1e-9), 2)
+
+
+def _check_narrow_spalls(case: Any, count: int, most: int) -> None:
+    """Refuse spalls (CaseError, E-SLICES) in which no middle of a slice lies."""
+    for key, spall in narrow_spalls(case):
+        if not spall.in_slices(count).any():
+            fewest = _fewest_slices(spall)
+            remedy = f"give static.slices = {fewest}" if fewest <= most else "give a wider one"
+            raise CaseError(
+                "the spall is narrower than a slice of the face width, and lies in none",
+                code="E-SLICES",
+                key=f"{key}.width",
+                file=case.location(f"{key}.width"),
+                limit=f"over the middle of one of {count} slices; at most {most} slices",
+                remedy=remedy,
+            )
 
 
 def _check_cracks(case: Any, other: str) -> None:
@@ -472,7 +511,7 @@ def over_width(
     if waves is None:
         waves = _waves_of_case(case, gears, steps or Steps(), cache)
     options: dict[str, Any] = {"waves": waves, "slices": count, "width_supports": width_supports(case, gears)}
-    if overlap := _overlap(case, gears):
+    if (overlap := _overlap(case, gears)) or narrow_spalls(case):
         options["ahead"] = slices_ahead(overlap, count)
     return options
 

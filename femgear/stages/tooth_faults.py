@@ -35,6 +35,8 @@ _SHOWS = 0.02
 """Change of a transmission error or of a share by a fault from which on it is told, over its usual value."""
 _HEARD = 1e-4
 """Line that a fault makes new, from which on it is told, over the largest line."""
+_TOLD_WIDTH = 0.02
+"""Difference between the width of a spall and that of its slices, relative, from which on it is told."""
 
 
 def fault_findings(case: Any) -> Iterator[Finding]:
@@ -47,6 +49,22 @@ def fault_findings(case: Any) -> Iterator[Finding]:
             text = f"this flank carries nothing under this torque{looked}"
             yield Finding("W-FAULT", key, text, remedy="give the fault to the other flank, or turn the torque round")
     yield from _unseen(case, gears)
+    yield from _in_whole_slices(case, gears)
+
+
+def _in_whole_slices(case: Any, gears: GearSet) -> Iterator[Finding]:
+    """Spalls over a part of the face width that whole slices make wider or narrower than they are."""
+    count, width = case.static.slices, min(gears.mesh_widths)
+    for key, fault in keyed_faults(case, gears):
+        if not isinstance(fault, Spall) or not fault.across or count < 2:
+            continue
+        given, covered = width * (fault.across[1] - fault.across[0]), int(fault.in_slices(count).sum())
+        if abs(covered * width / count - given) > _TOLD_WIDTH * given:
+            text = (
+                f"{1e3 * given:.4g} mm of the width count as {covered} of {count} slices, "
+                f"{1e3 * covered * width / count:.4g} mm"
+            )
+            yield Finding("W-FAULT", f"{key}.width", text, remedy="give a width of whole slices, or more slices")
 
 
 def left_out_of_faults(case: Any) -> Iterator[Finding]:

@@ -10,9 +10,10 @@ import pytest
 import xarray as xr
 
 from femgear.case import text as case_text
+from femgear.case.dependencies import Steps
 from femgear.case.gear_set import planetary_set, set_deviations
 from femgear.contact.flank_pairs import mesh_pairs
-from femgear.errors import CaseError
+from femgear.errors import CaseError, FemgearError
 from femgear.gears.deviations import common_period
 from femgear.gears.gear import Gear
 from femgear.gears.kinematics import speeds
@@ -30,7 +31,7 @@ from femgear.stages.tooth_faults import (
 )
 from femgear.trains.gearbox_of_case import gearbox_of_case
 from femgear.trains.reading import parse_case, read_case, with_values
-from femgear.trains.registry import train_of
+from femgear.trains.registry import check_case, train_of
 from validation.planetary import reference_set
 
 CASES = Path(__file__).parents[2] / "cases"
@@ -219,3 +220,93 @@ def test_faults_that_a_stage_of_a_gearbox_cannot_have_are_refused_where_they_sta
         parse_case(case_text.write(tables), name="box")
     keys = [problem.key for problem in refused.value.problems]
     assert keys == ["pair[0].teeth.gear_1.fault[0].depth", "pair[0].teeth.gear_1.fault[1].tooth"]
+
+
+# --- spalls over a part of the face width ------------------------------------------------------------
+
+SLICED = {"static.flank_elements": 4, "static.positions": 8, "static.stresses": False, "static.slices": 5}
+PIT = {"kind": "spall", "tooth": 3, "flank": "left", "diameter": "72.9 mm", "length": "1 mm", "depth": "40 um"}
+"""Amid the flank of the pinion of the pair, which meshes over 20 mm."""
+
+
+@pytest.fixture(scope="module")
+def sliced():
+    return with_values(read_case(CASES / "spur_pair.toml"), SLICED)
+
+
+@pytest.fixture(scope="module")
+def steps():
+    return Steps()
+
+
+def contact(sliced, steps, **changed):
+    entries = {"gear_1.fault": [PIT | changed["spall"]]} if "spall" in changed else {}
+    if "torque" in changed:
+        entries["operation.torque"] = changed["torque"]
+    return solve_static(with_values(sliced, entries), steps=steps).cycle
+
+
+def test_a_spall_in_all_slices_is_one_across_the_width_and_a_whole_width_is_none(sliced, steps):
+    across, all_slices = (contact(sliced, steps, spall=part) for part in ({}, {"width": "19.9 mm"}))
+    assert all_slices.deflection == pytest.approx(across.deflection, rel=1e-10)
+    assert all_slices.slice_load == pytest.approx(across.slice_load, abs=1e-9 * across.slice_load.max())
+    assert all_slices.stiffness.mean() == pytest.approx(across.stiffness.mean(), rel=2e-3)
+    for part in ({"width": "20 mm"}, {"width": "20 mm", "offset": "0 mm"}):
+        (spall,) = set_deviations(with_values(sliced, {"gear_1.fault": [PIT | part]})).faults
+        assert spall == set_deviations(with_values(sliced, {"gear_1.fault": [PIT]})).faults[0]
+
+
+@pytest.mark.slow
+def test_a_narrower_spall_does_less_down_to_nothing(sliced, steps):
+    whole = contact(sliced, steps)
+    largest = [
+        float((contact(sliced, steps, spall={"width": f"{4 * covered} mm"}).deflection).max()) for covered in (5, 3, 1)
+    ]
+    healthy = float(whole.deflection.max())
+    assert largest[0] > largest[1] > largest[2] > healthy
+    assert largest[2] - healthy < 0.15 * (largest[0] - healthy)
+
+
+@pytest.mark.slow
+def test_slices_of_the_spall_carry_less_on_the_side_where_it_lies_under_either_torque(sliced, steps):
+    spall = {"width": "8 mm", "offset": "6 mm"}
+    ahead = contact(sliced, steps, spall=spall)
+    torque = f"-{sliced.operation.torque} N m"
+    back = contact(sliced, steps, spall=spall | {"flank": "right"}, torque=torque)
+    loads = [cycle.slice_load[0].sum(axis=0)[:, int(cycle.deflection[0].argmax())] for cycle in (ahead, back)]
+    for of_slices in loads:
+        assert of_slices[3:].max() < 0.7 * of_slices[:3].min()
+    assert np.ptp(back.deflection) == pytest.approx(np.ptp(ahead.deflection), rel=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("changed", "slices", "key", "code"),
+    [
+        ({"width": "5 mm"}, 0, "gear_1.fault[0].width", "E-SLICES"),
+        ({"width": "1 mm", "offset": "2 mm"}, 5, "gear_1.fault[0].width", "E-SLICES"),
+        ({"width": "8 mm", "offset": "7 mm"}, 5, "gear_1.fault[0].width", "E-FAULT"),
+        ({"width": "21 mm"}, 5, "gear_1.fault[0].width", "E-FAULT"),
+    ],
+)
+def test_spalls_that_slices_do_not_show_are_refused(sliced, changed, slices, key, code):
+    case = with_values(sliced, {"gear_1.fault": [PIT | changed], "static.slices": slices})
+    with pytest.raises(FemgearError) as refused:
+        check_case(case)
+    assert (refused.value.key, refused.value.code) == (key, code)
+    assert refused.value.limit and refused.value.remedy
+
+
+def test_an_offset_needs_a_width_and_other_kinds_have_none(sliced):
+    for fault in (PIT | {"offset": "2 mm"}, {"kind": "missing", "tooth": 3, "width": "2 mm"}):
+        with pytest.raises(CaseError):
+            with_values(sliced, {"gear_1.fault": [fault]})
+
+
+def test_a_width_that_slices_change_is_told(sliced):
+    def said(width):
+        findings = fault_findings(with_values(sliced, {"gear_1.fault": [PIT | {"width": width}]}))
+        return [str(finding) for finding in findings if "slices" in str(finding)]
+
+    assert not said("12 mm")
+    (text,) = said("10 mm")
+    assert "10 mm of the width count as 3 of 5 slices, 12 mm" in text
