@@ -259,8 +259,8 @@ def profile_form(
             lambda roll_1, roll_2: profile_separation(deviations, planetary_set, kind, roll_1, roll_2, back=back)
         )
     if deviations.faults and tooth is not None and turns is not None:
-        met = _met(planetary_set, kind, back, tooth, turns)
-        faulty = fault_form(deviations.faults, planetary_set, kind, *met, slices)
+        teeth_and_sides = _met(planetary_set, kind, back, tooth, turns)
+        faulty = fault_form(deviations.faults, planetary_set, kind, *teeth_and_sides, slices)
         forms += [faulty] if faulty else []
     if len(forms) < 2:
         return forms[0] if forms else None
