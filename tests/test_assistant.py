@@ -1,12 +1,16 @@
 """The server for assistants, called by the client of its library: tools, answers, and what stays closed."""
 
 import asyncio
+import contextlib
+import io
 import json
+import subprocess
 import sys
 from pathlib import Path
 
 import pytest
 
+from femgear import assistant
 from femgear.assistant import MOST_TEXT, SKILL, check_text, command, make_server, place_in
 from femgear.cli import main
 from femgear.errors import CaseError
@@ -18,6 +22,27 @@ pytestmark = pytest.mark.usefixtures("pictures_undrawn")
 pytest.importorskip("mcp", reason='pip install "femgear[assistant]"')
 CASE = Path(__file__).parents[1] / "cases" / "spur_pair.toml"
 TOOLS = ["list_files", "read_case", "write_case", "new", "check", "run", "results", "compare", "explain"]
+
+
+@pytest.fixture
+def commands_run_here(monkeypatch):
+    """Commands of the server run within the test: to start their processes takes longer than they do.
+
+    `test_commands_have_exit_code_data_and_messages` has the processes.
+    """
+
+    class Here:
+        DEVNULL, TimeoutExpired = subprocess.DEVNULL, subprocess.TimeoutExpired
+
+        @staticmethod
+        def run(command, *, cwd, **_):
+            assert command[:3] == [sys.executable, "-m", "femgear"]
+            printed, messages = io.StringIO(), io.StringIO()
+            with contextlib.chdir(cwd), contextlib.redirect_stdout(printed), contextlib.redirect_stderr(messages):
+                code = main(command[3:])
+            return subprocess.CompletedProcess(command, code, printed.getvalue(), messages.getvalue())
+
+    monkeypatch.setattr(assistant, "subprocess", Here)
 
 
 def asked(server, *calls):
@@ -33,7 +58,7 @@ def asked(server, *calls):
     return asyncio.run(talk())
 
 
-def test_a_case_goes_from_new_to_its_answers(tmp_path):
+def test_a_case_goes_from_new_to_its_answers(tmp_path, commands_run_here):
     server = make_server(tmp_path)
     few = {"static.positions": 8, "static.flank_elements": 6, "static.stresses": False}
     text = with_values(read_case(CASE), few).source
@@ -56,7 +81,7 @@ def test_a_case_goes_from_new_to_its_answers(tmp_path):
     assert "Meshes pull" in explained
 
 
-def test_what_lies_outside_stays_closed(tmp_path):
+def test_what_lies_outside_stays_closed(tmp_path, commands_run_here):
     inside = tmp_path / "inside"
     inside.mkdir()
     (tmp_path / "secret.toml").write_text("model = 1", encoding="utf-8")
@@ -82,7 +107,7 @@ def test_what_lies_outside_stays_closed(tmp_path):
     assert sorted(path.name for path in tmp_path.rglob("*")) == ["inside", "link.toml", "secret.toml"]
 
 
-def test_refused_calls_say_what_is_needed_and_leave_nothing(tmp_path):
+def test_refused_calls_say_what_is_needed_and_leave_nothing(tmp_path, commands_run_here):
     _, answers = asked(
         make_server(tmp_path),
         ("run", {}),
