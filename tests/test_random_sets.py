@@ -28,7 +28,7 @@ from femgear.trains.reading import with_value, with_values
 from validation.reference.sensor_in_time import symmetry_leakage
 
 # every kind and every number of planets; `make soak` goes on beyond the others
-QUICK = (1, 4, 7, 8, 10, 13, 15, 18)
+QUICK = (10, 13, 15, 60, 275, 289)
 SLOW = range(500)
 # gates: of static records of equal sets, of their levels (fixed points of EXACT), and of twice the positions
 ROUNDING, DYNAMIC, POSITIONS = 1e-6, 1e-5, 0.03
