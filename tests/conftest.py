@@ -157,10 +157,15 @@ def pictures_undrawn():
 
 @pytest.fixture(scope="module")
 def coarse_states():
-    """Loaded states of few positions, for files whose tests compare runs, whatever the numbers."""
-    from femgear.contact import loaded_period
+    """Loaded states of few positions without a search for peaks between them.
+
+    For files whose tests compare runs, whatever the numbers.
+    """
+    from femgear.contact import cycle, loaded_period
 
     with pytest.MonkeyPatch.context() as patch:
         for name, value in (("SHORTEST", 0.02), ("SMOOTHEST", 0.05), ("STEEP", 0.2), ("MISSED", 0.05)):
             patch.setattr(loaded_period, name, value)
+        for name, value in (("FEWEST", 1), ("MOST_ROUNDS", 0)):
+            patch.setattr(cycle, name, value)
         yield

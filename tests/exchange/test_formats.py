@@ -30,7 +30,7 @@ from femgear.storage.results import dataset, tables_of
 from femgear.trains.elastic.results import run_up_lines, sensor_signals
 from femgear.trains.reading import read_case, to_toml, with_values
 
-pytestmark = pytest.mark.usefixtures("pictures_undrawn")
+pytestmark = pytest.mark.usefixtures("pictures_undrawn", "coarse_states")
 
 CASE = Path(__file__).parents[2] / "cases" / "planetary_27_40_108.toml"
 QUICK = {

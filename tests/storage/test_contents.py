@@ -11,6 +11,8 @@ from femgear.run import solve
 from femgear.storage.contents import Contents, Datasets, Labelled, as_dataset
 from femgear.storage.files import read_dataset, write_dataset
 
+pytestmark = pytest.mark.usefixtures("coarse_states")
+
 CASES = ["planetary_27_40_108"]
 
 

@@ -22,6 +22,8 @@ from femgear.trains.gearbox.nonlinear import nonlinear_gearbox
 from femgear.trains.gearbox.transient import all_excitations
 from femgear.trains.reading import read_case
 
+pytestmark = pytest.mark.usefixtures("coarse_states")
+
 needs_compiler = pytest.mark.skipif(not shutil.which("cc"), reason="no C compiler")
 HARMONICS, LINES, INSTANTS = 3, 24, 65
 

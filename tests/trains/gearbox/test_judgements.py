@@ -14,6 +14,8 @@ from femgear.stages.judgements import QUIET, SMOOTH, STRONG, SURE
 from femgear.trains.gearbox.judgements import gearbox_judgements
 from femgear.trains.gearbox.mode_words import near_mode
 
+pytestmark = pytest.mark.usefixtures("coarse_states")
+
 
 class Files(SimpleNamespace):
     def __getitem__(self, name):

@@ -10,6 +10,8 @@ from femgear.trains.gearbox.key_figures import gearbox_key_figures, stage_meshes
 from femgear.trains.live import Answer
 from femgear.trains.reading import read_case
 
+pytestmark = pytest.mark.usefixtures("coarse_states")
+
 
 @pytest.fixture(scope="module")
 def answer():

@@ -11,6 +11,8 @@ from femgear.trains.gearbox.response import GearboxResponse, solve_gearbox_respo
 from femgear.trains.gearbox.response_results import GearboxResponseResult
 from femgear.trains.reading import read_case
 
+pytestmark = pytest.mark.usefixtures("coarse_states")
+
 
 def by_path(found: Deflection) -> GearboxResponse:
     return solve_gearbox_response(found, [1000.0 * RPM], by_path=True)

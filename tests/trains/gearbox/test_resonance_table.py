@@ -10,6 +10,8 @@ from femgear.trains.gearbox.response import accelerations, solve_gearbox_respons
 from femgear.trains.gearbox.response_results import GearboxResponseResult
 from femgear.trains.gearbox.run_up_speeds import gearbox_resonances, run_up_speeds
 
+pytestmark = pytest.mark.usefixtures("coarse_states")
+
 
 @pytest.fixture(scope="module")
 def solved():

@@ -18,6 +18,8 @@ from femgear.trains.gearbox.response import (
 )
 from femgear.trains.reading import read_case
 
+pytestmark = pytest.mark.usefixtures("coarse_states")
+
 
 def test_lines_are_multiples_of_the_mesh_frequency():
     found = response()

@@ -19,6 +19,8 @@ from femgear.trains.gearbox.response_results import (
     response_tables,
 )
 
+pytestmark = pytest.mark.usefixtures("coarse_states")
+
 
 @pytest.fixture
 def data():

@@ -12,6 +12,8 @@ from femgear.trains.gearbox.run_up_speeds import (
     strongest_of_each,
 )
 
+pytestmark = pytest.mark.usefixtures("coarse_states")
+
 
 @pytest.fixture(scope="module")
 def resonances():

@@ -14,6 +14,8 @@ from femgear.stages.protocol import Drawn
 from femgear.trains.gearbox.solid_bodies import gearbox_bodies, write_space
 from femgear.trains.reading import read_case, with_value
 
+pytestmark = pytest.mark.usefixtures("coarse_states")
+
 CASES = Path(__file__).parents[3] / "cases"
 
 

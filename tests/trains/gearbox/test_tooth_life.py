@@ -20,6 +20,8 @@ from femgear.trains.gearbox.tooth_life import (
 )
 from femgear.trains.reading import read_case
 
+pytestmark = pytest.mark.usefixtures("coarse_states")
+
 STEEL = {"treatment": "case hardened steel", "hardness": 720}
 
 

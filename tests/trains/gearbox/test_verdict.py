@@ -10,6 +10,8 @@ from femgear.findings import DOUBT, Finding
 from femgear.trains.gearbox.mode_words import nearest_mode
 from femgear.trains.gearbox.verdict import gearbox_verdict, level_text
 
+pytestmark = pytest.mark.usefixtures("coarse_states")
+
 
 @pytest.fixture(scope="module")
 def results():
