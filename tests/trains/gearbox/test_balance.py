@@ -37,6 +37,8 @@ from femgear.trains.gearbox_of_case import gearbox_of_case
 from femgear.trains.reading import read_case, with_value
 from femgear.trains.registry import check_case
 
+pytestmark = pytest.mark.usefixtures("coarse_states")
+
 
 def heavy_set(torque: str, **balance) -> Deflection:
     """Plane set with play and tooth pairs that come and go, under its weight."""

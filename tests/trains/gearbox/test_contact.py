@@ -23,6 +23,8 @@ from femgear.trains.gearbox.contact import (
 from femgear.trains.gearbox.deflection import solve_deflection
 from femgear.trains.reading import read_case
 
+pytestmark = pytest.mark.usefixtures("coarse_states")
+
 
 @pytest.mark.parametrize("back", [False, True])
 def test_any_slopes_of_a_set_are_those_of_askew_planets(back):

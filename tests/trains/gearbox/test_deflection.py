@@ -25,6 +25,8 @@ from femgear.trains.gearbox.deflection import mesh_separation, mesh_slopes, roll
 from femgear.trains.gearbox.model import gearbox_model
 from femgear.trains.reading import read_case
 
+pytestmark = pytest.mark.usefixtures("coarse_states")
+
 BALL = {
     "kind": "ball",
     "rolling_elements": 9,

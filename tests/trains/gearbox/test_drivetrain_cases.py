@@ -18,6 +18,8 @@ from femgear.trains.gearbox.stage_structure import in_time
 from femgear.trains.reading import read_case, to_toml, with_values
 from validation import drivetrain
 
+pytestmark = pytest.mark.usefixtures("coarse_states")
+
 CASES = Path(__file__).parents[3] / "cases"
 TEXT = """
     model = "drivetrain"

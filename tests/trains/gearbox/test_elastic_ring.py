@@ -22,6 +22,8 @@ from femgear.trains.gearbox.sensors import gearbox_sensors, sensor_rows
 from femgear.trains.gearbox.stage_structure import running_stage
 from femgear.trains.reading import read_case, with_values
 
+pytestmark = pytest.mark.usefixtures("coarse_states")
+
 FEW = {"static.positions": 16, "static.flank_elements": 8, "static.stresses": False, "dynamics.up_to": "4 kHz"}
 
 

@@ -24,6 +24,8 @@ from femgear.trains.gearbox.response import solve_gearbox_response
 from femgear.trains.gearbox.transient import all_excitations
 from femgear.trains.reading import read_case
 
+pytestmark = pytest.mark.usefixtures("coarse_states")
+
 
 def loaded_pair(torque: str = "100 N m", **mesh) -> Deflection:
     """Pair of a given stiffness and contact ratio under a torque."""

@@ -36,6 +36,8 @@ from femgear.trains.gearbox.stage_structure import running_stage
 from femgear.trains.gearbox_of_case import gearbox_of_case
 from femgear.trains.reading import read_case, with_values
 
+pytestmark = pytest.mark.usefixtures("coarse_states")
+
 ACTS = {"friction": "constant", "coefficient": 0.06, "excites": True}
 FEW = {"static.positions": 16, "static.flank_elements": 8, "static.stresses": False, "dynamics.up_to": "4 kHz"}
 HELD = {"gear_1.bearing_stiffness": "2e8 N/m", "gear_2.bearing_stiffness": "3e8 N/m"}

@@ -12,6 +12,8 @@ from femgear.trains.gearbox.planet_errors import error_gaps
 from femgear.trains.gearbox.results import DeflectionResult, deflection_warnings
 from femgear.trains.reading import read_case
 
+pytestmark = pytest.mark.usefixtures("coarse_states")
+
 COSINE = math.cos(math.radians(20.0))
 LEVER = STEPPED[1] / STEPPED[2]
 

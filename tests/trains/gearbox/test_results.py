@@ -19,6 +19,8 @@ from femgear.trains.gearbox.results import (
 from femgear.trains.gearbox.stages import solve_box_modes, solve_deflections
 from femgear.trains.reading import read_case
 
+pytestmark = pytest.mark.usefixtures("coarse_states")
+
 BALL = {"kind": "ball", "rolling_elements": 9, "element_diameter": "9.5 mm", "pitch_diameter": "46 mm"}
 
 

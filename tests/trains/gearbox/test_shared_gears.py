@@ -14,6 +14,8 @@ from femgear.trains.gearbox.strength import rated_stages
 from femgear.trains.gearbox.tooth_life import stage_spectra
 from femgear.trains.reading import read_case
 
+pytestmark = pytest.mark.usefixtures("coarse_states")
+
 STEEL = {"treatment": "case hardened steel", "hardness": 720}
 LINES = GEAR_STEELS["case hardened steel"]
 HOUR = 3600.0

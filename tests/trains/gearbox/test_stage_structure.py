@@ -29,6 +29,8 @@ from femgear.trains.gearbox.stage_structure import (
 )
 from femgear.trains.reading import read_case
 
+pytestmark = pytest.mark.usefixtures("coarse_states")
+
 POSITIONS = 32
 
 

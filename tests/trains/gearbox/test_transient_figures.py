@@ -13,6 +13,8 @@ from femgear.trains.gearbox.stages import solve_deflections
 from femgear.trains.gearbox.transient_figures import band, over_time, spectra, spectrum_figures, transient_figures
 from femgear.trains.reading import read_case, with_value, with_values
 
+pytestmark = pytest.mark.usefixtures("coarse_states")
+
 CASE = Path(__file__).parents[3] / "cases" / "own_chain.toml"
 
 TIME = np.linspace(0.0, 1.0, 50)
