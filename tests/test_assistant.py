@@ -17,7 +17,7 @@ from femgear.errors import CaseError
 from femgear.trains.drafts import KINDS
 from femgear.trains.reading import read_case, with_values
 
-pytestmark = pytest.mark.usefixtures("pictures_undrawn")
+pytestmark = pytest.mark.usefixtures("pictures_undrawn", "coarse_states")
 
 pytest.importorskip("mcp", reason='pip install "femgear[assistant]"')
 CASE = Path(__file__).parents[1] / "cases" / "spur_pair.toml"

@@ -11,6 +11,8 @@ from femgear.measured.requests import LineSearch, Recording
 from femgear.measured.verdict import measured_verdict
 from femgear.trains.reading import with_values
 
+pytestmark = pytest.mark.usefixtures("coarse_states")
+
 UM = 1e-6
 
 

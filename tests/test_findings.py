@@ -25,7 +25,7 @@ from femgear.stages.static_results import describe_stress
 from femgear.trains.reading import open_results, read_case, with_values
 from femgear.trains.registry import train_of, trains
 
-pytestmark = pytest.mark.usefixtures("pictures_undrawn")
+pytestmark = pytest.mark.usefixtures("pictures_undrawn", "coarse_states")
 
 PACKAGE = Path(__file__).parents[1] / "femgear"
 CASES = Path(__file__).parents[1] / "cases"

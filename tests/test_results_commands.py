@@ -25,7 +25,7 @@ from femgear.storage.results import (
 )
 from femgear.trains.reading import read_case, with_values
 
-pytestmark = pytest.mark.usefixtures("pictures_undrawn")
+pytestmark = pytest.mark.usefixtures("pictures_undrawn", "coarse_states")
 
 CASE = Path(__file__).parents[1] / "cases" / "planetary_27_40_108.toml"
 

@@ -15,6 +15,8 @@ from femgear.stages.static import solve_static
 from femgear.trains.reading import parse_case, with_values
 from femgear.trains.registry import train_of
 
+pytestmark = pytest.mark.usefixtures("coarse_states")
+
 CASES = Path(__file__).parents[2] / "cases"
 CACHE = Path(__file__).parents[2] / "meshes"
 COARSE = """

@@ -9,7 +9,7 @@ from command_stand_ins import CASE, STAGES
 from femgear import cli
 from femgear.trains.reading import open_results, read_case
 
-pytestmark = pytest.mark.usefixtures("pictures_undrawn")
+pytestmark = pytest.mark.usefixtures("pictures_undrawn", "coarse_states")
 
 
 def test_export_writes_every_number_with_its_unit(tmp_path, capsys, pipeline):

@@ -19,6 +19,8 @@ from femgear.housing.two_way.response import MeshPaths, structure_lines
 from validation.fixed_housing import EQUAL, solved
 from validation.reference.annulus import annulus_frequencies
 
+pytestmark = pytest.mark.usefixtures("coarse_states")
+
 PRESSURE = np.radians(20.0)
 KNOWN = {"direction": (np.sin(PRESSURE), -np.cos(PRESSURE)), "pitch_radius": 0.081, "damping_ratio": 0.02}
 TINY = Casing(size=0.02, points=16, modes=8)

@@ -31,6 +31,8 @@ from femgear.solvers.periodic.spectral import solve_spectral
 from femgear.system.fourier import sample
 from femgear.system.system import NonlinearSystem, gear_meshes
 
+pytestmark = pytest.mark.usefixtures("coarse_states")
+
 needs_compiler = pytest.mark.skipif(not shutil.which("cc"), reason="no C compiler")
 POINTS = 32
 DEFLECTION, FORCE = "deflection_of_gear_1_gear_2", "force_of_gear_1_gear_2"

@@ -23,6 +23,8 @@ from femgear.trains.gearbox.power import gearbox_flow
 from femgear.trains.imports import case_drafts
 from femgear.trains.reading import parse_case, read_case
 
+pytestmark = pytest.mark.usefixtures("coarse_states")
+
 
 def tables_of(box, tmp_path) -> tuple[dict, dict, list]:
     """Tables, remarks and findings of a unit."""

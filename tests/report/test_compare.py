@@ -15,6 +15,8 @@ from femgear.storage.results import run_folder
 from femgear.trains.reading import open_results, read_case, with_value, with_values
 from femgear.trains.registry import train_of
 
+pytestmark = pytest.mark.usefixtures("coarse_states")
+
 CASE = Path(__file__).resolve().parents[2] / "cases" / "planetary_27_40_108.toml"
 
 

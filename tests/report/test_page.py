@@ -19,7 +19,7 @@ from femgear.storage.results import prepare_output
 from femgear.trains.elastic.stages import ELASTIC
 from femgear.trains.reading import open_results, parse_case, read_case, with_value, with_values
 
-pytestmark = pytest.mark.usefixtures("pictures_undrawn")
+pytestmark = pytest.mark.usefixtures("pictures_undrawn", "coarse_states")
 
 _HERE = Path(__file__).parents[1]
 _SPEC = importlib.util.spec_from_file_location("synthetic_results", _HERE / "synthetic_results.py")

@@ -11,7 +11,7 @@ from femgear.trains.gearbox.transient_results import describe_transient, transie
 from femgear.trains.reading import open_results, read_case, with_value
 from femgear.trains.registry import train_of
 
-pytestmark = pytest.mark.usefixtures("pictures_undrawn")
+pytestmark = pytest.mark.usefixtures("pictures_undrawn", "coarse_states")
 
 CASES = Path(__file__).parents[2] / "cases"
 

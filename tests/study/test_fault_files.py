@@ -15,6 +15,8 @@ from femgear.study.fault_files import fault_records_into
 from femgear.study.fault_request import FaultRequest, FurtherRecords
 from femgear.trains.reading import read_case, with_values
 
+pytestmark = pytest.mark.usefixtures("coarse_states")
+
 CASES = Path(__file__).parents[2] / "cases"
 REQUEST = {"kinds": ("healthy,wear",), "each": 2, "seed": 7, "duration": "0.05 s", "gears": ("ring",)}
 

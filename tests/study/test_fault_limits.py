@@ -24,6 +24,8 @@ from femgear.study.fault_records import fault_plan
 from femgear.study.fault_request import FaultRequest
 from femgear.trains.reading import read_case, with_values
 
+pytestmark = pytest.mark.usefixtures("coarse_states")
+
 CASES = Path(__file__).parents[2] / "cases"
 WHOLE, BETWEEN = NEW_LINES
 GEARS = SimpleNamespace(rotations=3, ring=SimpleNamespace(teeth=108))

@@ -11,6 +11,8 @@ from femgear.study.fault_records import fault_plan, machine_case, record_case, s
 from femgear.study.fault_request import FaultRequest
 from femgear.trains.reading import parse_case, read_case, with_values
 
+pytestmark = pytest.mark.usefixtures("coarse_states")
+
 CASES = Path(__file__).parents[2] / "cases"
 STILL = CASES / "tolerances" / "still.toml"
 SHORT = {"each": 2, "seed": 7, "duration": "0.05 s", "gears": ("planet",)}

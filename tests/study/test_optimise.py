@@ -18,6 +18,8 @@ from femgear.trains.live import Answer
 from femgear.trains.reading import read_case
 from validation.soak import programs
 
+pytestmark = pytest.mark.usefixtures("coarse_states")
+
 ROOT = Path(__file__).resolve().parents[2]
 CASE = ROOT / "cases" / "planetary_27_40_108.toml"
 

@@ -9,7 +9,7 @@ from femgear.findings import as_text
 from femgear.study import sample_results
 from femgear.study.sample_results import QUANTILES, SHOWN, open_columns
 
-pytestmark = pytest.mark.usefixtures("pictures_undrawn")
+pytestmark = pytest.mark.usefixtures("pictures_undrawn", "coarse_states")
 
 WIDTHS = {"error": 0, "share": 3}
 

@@ -33,7 +33,7 @@ from femgear.study.sweep import describe_sweep, parse_over, sweep, sweep_into
 from femgear.trains.live import Live
 from femgear.trains.reading import read_case, with_value, with_values
 
-pytestmark = pytest.mark.usefixtures("pictures_undrawn")
+pytestmark = pytest.mark.usefixtures("pictures_undrawn", "coarse_states")
 
 CASE = Path(__file__).resolve().parents[2] / "cases" / "planetary_27_40_108.toml"
 # entries without consequences for the gears: numbers from 0 to 1 and masses

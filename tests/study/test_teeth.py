@@ -17,6 +17,8 @@ from femgear.trains.gearbox.power import gearbox_flow
 from femgear.trains.gearbox.results import gearbox_warnings
 from femgear.trains.reading import parse_case, read_case, with_values
 
+pytestmark = pytest.mark.usefixtures("coarse_states")
+
 QUICK = ("--tolerance", "0.004", "--best", "1", "--positions", "8", "--flank-elements", "6")
 SET = ToothDemand(5.0)
 

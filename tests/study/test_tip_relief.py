@@ -15,7 +15,7 @@ from femgear.study.relief import with_tip_relief
 from femgear.study.tip_relief import with_relief_tables
 from femgear.trains.reading import parse_case, read_case, with_value
 
-pytestmark = pytest.mark.usefixtures("pictures_undrawn")
+pytestmark = pytest.mark.usefixtures("pictures_undrawn", "coarse_states")
 
 ROOT = Path(__file__).resolve().parents[2]
 CASE = ROOT / "cases" / "planetary_27_40_108.toml"

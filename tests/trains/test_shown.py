@@ -7,6 +7,8 @@ import pytest
 import femgear
 from femgear.errors import CaseError
 
+pytestmark = pytest.mark.usefixtures("coarse_states")
+
 CASES = Path(__file__).parents[2] / "cases"
 PAIR = (CASES / "spur_pair.toml").read_text("utf-8").replace("positions = 64", "positions = 8")
 

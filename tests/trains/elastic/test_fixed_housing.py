@@ -22,7 +22,7 @@ from femgear.trains.elastic.runup import describe_runup
 from femgear.trains.elastic.stages import solve_dynamics, solve_housing, solve_modes, solve_runup
 from femgear.trains.reading import parse_case, read_case, with_values
 
-pytestmark = pytest.mark.usefixtures("pictures_undrawn")
+pytestmark = pytest.mark.usefixtures("pictures_undrawn", "coarse_states")
 
 CASE = Path(__file__).parents[3] / "cases" / "planetary_27_40_108.toml"
 FEET = [

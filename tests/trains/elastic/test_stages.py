@@ -25,6 +25,8 @@ from femgear.trains.reading import parse_case, read_case, with_value, with_value
 from validation.cases import reference_case
 from validation.reference.sensor_in_time import symmetry_leakage
 
+pytestmark = pytest.mark.usefixtures("coarse_states")
+
 ROOT = Path(__file__).parents[3]
 
 

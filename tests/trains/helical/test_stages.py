@@ -30,7 +30,7 @@ from femgear.trains.reading import open_results, parse_case, read_case, to_toml,
 from femgear.trains.registry import stages_of as stages_of_case
 from validation.helical import PHASINGS, TABLE_4
 
-pytestmark = pytest.mark.usefixtures("pictures_undrawn")
+pytestmark = pytest.mark.usefixtures("pictures_undrawn", "coarse_states")
 
 ROOT = Path(__file__).parents[3]
 GIVEN = {"sun_planet": "200e6 N/m", "planet_ring": "200e6 N/m"}

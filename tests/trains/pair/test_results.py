@@ -13,6 +13,8 @@ from femgear.trains.pair import stages
 from femgear.trains.pair.results import pair_dynamics_warnings, pair_runup_warnings
 from femgear.trains.pair.stages import solve_pair_dynamics, solve_pair_modes, solve_pair_runup
 
+pytestmark = pytest.mark.usefixtures("coarse_states")
+
 
 @pytest.mark.parametrize(
     ("points", "words"),

@@ -19,7 +19,7 @@ from femgear.trains.pair.stages import solve_pair_dynamics, solve_pair_modes, so
 from femgear.trains.reading import read_case, to_toml, with_values
 from femgear.trains.registry import stages_of
 
-pytestmark = pytest.mark.usefixtures("pictures_undrawn")
+pytestmark = pytest.mark.usefixtures("pictures_undrawn", "coarse_states")
 
 CASE = Path(__file__).parents[3] / "cases" / "spur_pair.toml"
 PLAIN = {
