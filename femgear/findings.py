@@ -170,7 +170,7 @@ CATALOGUE = {
     "W-FAULT": Meaning(
         DOUBT,
         "A fault of a tooth has effects that the model leaves out, or none that shows.",
-        "fault of a tooth in part left out",
+        "effects of a fault left out",
         "Take orders and places as they are, and sizes with the margin of the message.",
     ),
     "W-FILLET": Meaning(

@@ -102,6 +102,8 @@ def test_effects_of_a_fault_are_those_of_its_mesh_periods():
     assert error == "transmission error 3 in place of 2 µm"
     assert shares == "planet 1 carries 28.0% in place of 33.3% of the torque"
     assert line == "new lines, at 40 Hz 20 dB below the largest"
+    static["ste_peak_to_peak"] = ("mesh", [3.4e-6, 1e-6])
+    assert next(fault_effects(run)) == "transmission error 3.4 in place of 2 µm"
     housing["lines_real"][:, 2] = 0.0
     static["ste"][0, 2:4] = usual
     static["load_share"][:] = 1.0 / 3.0
