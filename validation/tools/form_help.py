@@ -10,6 +10,8 @@ import re
 from collections.abc import Container, Iterator
 from pathlib import Path
 
+from validation.tools.gearbox_keys import meanings_on
+
 ROOT = Path(__file__).parents[2]
 SOURCE, TARGET = ROOT / "docs" / "case_file.md", ROOT / "femgear" / "app" / "help.json"
 GEARBOX = ROOT / "docs" / "gearbox.md"
@@ -45,13 +47,13 @@ def help_texts(text: str) -> Iterator[tuple[str, str]]:
 
 
 def gearbox_texts(text: str, known: Container[str]) -> Iterator[tuple[str, str]]:
-    """Read what the table of keys says of entries of a gearbox, but for those that are ``known`` by their last names.
+    """Read what the tables of keys say of entries of a gearbox, but for those that are ``known`` by their last names.
 
     Names have three parts at most, as many as the form looks for.
     """
-    for path, key, meaning in re.findall(r"(?m)^\| `\[+([\w.]+)\]+` \| `(\w+)` \| ([^|]+) \| [^|]+ \| [^|]+ \|$", text):
+    for (path, key), meaning in meanings_on(text).items():
         parts = f"{path}.{key}".split(".")
-        if ".".join(parts[-2:]) not in known:
+        if path and ".".join(parts[-2:]) not in known:
             yield ".".join(parts[-3:]), plain(meaning)
 
 

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Write the table of all keys of a gearbox case in docs/gearbox.md, from the sections that read them::
+"""Write the tables of all keys of a gearbox case in docs/gearbox.md, from the sections that read them::
 
     python validation/tools/gearbox_keys.py
 
@@ -31,28 +31,36 @@ DIMENSIONS = {
 
 def meanings_on(text: str) -> dict[tuple[str, str], str]:
     """Read what the page says that keys mean, by table and key."""
-    rows = re.findall(r"(?m)^\| (\S*) ?\| `(\w+)` \| (.*?) ?\| .* \| .* \|$", text.split(BEGIN)[1].split(END)[0])
-    return {(path, key): meaning for path, key, meaning in rows}
+    meanings, path = dict[tuple[str, str], str](), ""
+    for line in text.split(BEGIN)[1].split(END)[0].splitlines():
+        if title := re.fullmatch(r"\*\*`\[+([\w.]+)\]+`\*\*", line):
+            path = title[1]
+        elif row := re.fullmatch(r"\| `(\w+)` \| (.*?) ?\| .* \| .* \|", line):
+            meanings[path, row[1]] = row[2]
+    return meanings
 
 
-def table(meanings: Mapping[tuple[str, str], str]) -> str:
-    """Make the table as Markdown: section, key, meaning, value, default."""
+def tables(meanings: Mapping[tuple[str, str], str]) -> str:
+    """Make the tables as Markdown, one a section: key, meaning, value, default."""
     schema = GearboxCase.model_json_schema()
-    lines = ["| table | key | meaning | value | default |", "|---|---|---|---|---|"]
+    lines = ["At the top:"]
     for path, section in _sections(schema, schema, ""):
+        lines += [f"**{path}**"] if path else []
+        lines += ["", "| key | meaning | value | default |", "|---|---|---|---|"]
         required = section.get("required", ())
         for key, entry in section["properties"].items():
             plain = _plain(entry)
             default = "needed" if key in required else _default(plain, entry.get("default"))
-            cells = path, f"`{key}`", meanings.get((path, key), ""), _value(plain), default
+            cells = f"`{key}`", meanings.get((path.strip("`[]"), key), ""), _value(plain), default
             lines.append(f"| {' | '.join(cells)} |".replace("|  |", "| |"))
-    return "\n".join(lines) + "\n"
+        lines.append("")
+    return "\n".join(lines)
 
 
-def page_with_table(text: str) -> str:
-    """Put the table between its marks on the page."""
+def page_with_tables(text: str) -> str:
+    """Put the tables between their marks on the page."""
     before, rest = text.split(BEGIN)
-    return f"{before}{BEGIN}\n\n{table(meanings_on(text))}\n{END}{rest.split(END)[1]}"
+    return f"{before}{BEGIN}\n\n{tables(meanings_on(text))}\n{END}{rest.split(END)[1]}"
 
 
 def _sections(schema: Mapping[str, Any], section: Mapping[str, Any], path: str) -> Iterator[tuple[str, Any]]:
@@ -120,4 +128,4 @@ def _written(value: object) -> str:
 
 
 if __name__ == "__main__":
-    PAGE.write_text(page_with_table(PAGE.read_text(encoding="utf-8")), encoding="utf-8")
+    PAGE.write_text(page_with_tables(PAGE.read_text(encoding="utf-8")), encoding="utf-8")
