@@ -7,12 +7,15 @@ from __future__ import annotations
 
 import json
 import re
+import sys
 from collections.abc import Container, Iterator
 from pathlib import Path
 
-from validation.tools.gearbox_keys import meanings_on
-
 ROOT = Path(__file__).parents[2]
+sys.path.insert(0, str(ROOT))
+
+from validation.tools.gearbox_keys import meanings_on  # noqa: E402  of this checkout
+
 SOURCE, TARGET = ROOT / "docs" / "case_file.md", ROOT / "femgear" / "app" / "help.json"
 GEARBOX = ROOT / "docs" / "gearbox.md"
 _LISTS = {"modifications": "modifications", "errors": "errors", "load": "load_case"}
