@@ -18,7 +18,7 @@ import numpy as np
 
 from femgear.case.dependencies import fingerprint
 from femgear.case.gear_set import planetary_set
-from femgear.errors import CaseError, StorageError, nvh_library
+from femgear.errors import CaseError, FemgearError, StorageError, nvh_library
 from femgear.exchange.dynamic_model import DynamicModel, StiffnessTable
 from femgear.exchange.formats import (
     SCALES,
@@ -180,6 +180,19 @@ def dynamic_model(case: Any, *, progress: Progress = silent) -> DynamicModel:
         )
     train_of(case).check_model(case)
     return make(case, solve(case, "modes", progress=progress))
+
+
+def run_harmonics(results: Results) -> dict[float, int]:
+    """Count the mesh harmonics that excite a run, by its first and last speed of operation [rpm].
+
+    Nothing of runs without a response, and of those that dynamics.nc has no end of the excitation of.
+    """
+    if "dynamics" not in results.stages or "excitation_limit" not in (data := results.dynamics):
+        return {}
+    if "mesh_frequency" not in data or data["mesh_frequency"].dims != ("speed",):
+        return {}
+    speeds, count = data["speed"].values, np.round(data["excitation_limit"].values / data["mesh_frequency"].values)
+    return {float(speeds[at]): int(count[at]) for at in (0, -1)}
 
 
 def stiffness_table(source: Any, *, progress: Progress = silent) -> StiffnessTable:
@@ -532,21 +545,10 @@ def export_results(
     The folder was made ready by `own_files` or `list_own`. Returns the names of the files. FemgearError: the
     run has no signals or modes (E-STAGE), the library of a format is not installed (E-LIBRARY).
     """
+    for refusal in refused_formats(results, formats).values():
+        raise refusal
     recorded, files = train_of(results.case).recorded, list[str]()
     needs = {} if recorded is None else recorded.needs
-    without = [form for form in formats if form in _RECORDED and form not in needs]
-    for form, stages in needs.items():
-        without += [form] if form in formats and not {*stages} <= {*results.stages} else []
-    if without:
-        possible = "; ".join(f"--{form} with the stages {', '.join(stages)}" for form, stages in needs.items())
-        raise CaseError(
-            "the run has nothing that these formats hold",
-            code="E-STAGE",
-            value=", ".join(f"--{form}" for form in without),
-            limit=possible or "runs with an elastic ring, --wav of pairs and gearboxes",
-            remedy="export tables, or run such a case without --only",
-        )
-    _need_libraries(formats)
     if "csv" in formats:
         for number, stage in enumerate(results):
             progress("csv", number, len(results.stages))
@@ -588,13 +590,38 @@ def export_results(
     return files
 
 
-def _need_libraries(formats: Collection[str]) -> None:
-    """Refuse formats whose library is not installed (E-LIBRARY), before any file is written."""
-    for form, (words, library) in _LIBRARIES.items():
-        if form in formats:
-            with nvh_library(words):
-                if find_spec(library) is None:
-                    raise ImportError(f"No module named {library!r}")
+def refused_formats(results: Results, formats: Collection[str]) -> dict[str, FemgearError]:
+    """Find which formats of `export_results` cannot be written of a run, each with its refusal.
+
+    The run has no signals or modes (E-STAGE), or the library of a format is not installed (E-LIBRARY).
+    """
+    recorded = train_of(results.case).recorded
+    needs, refused = {} if recorded is None else recorded.needs, dict[str, FemgearError]()
+    possible = "; ".join(f"--{form} with the stages {', '.join(stages)}" for form, stages in needs.items())
+    for form in formats:
+        if form in _RECORDED and not (form in needs and {*needs[form]} <= {*results.stages}):
+            refused[form] = CaseError(
+                "the run has nothing that this format holds",
+                code="E-STAGE",
+                value=f"--{form}",
+                limit=possible or "runs with an elastic ring, --wav of pairs and gearboxes",
+                remedy="export tables, or run such a case without --only",
+            )
+            continue
+        try:
+            _need_library(form)
+        except FemgearError as error:
+            refused[form] = error
+    return refused
+
+
+def _need_library(form: str) -> None:
+    """Refuse a format whose library is not installed (E-LIBRARY)."""
+    if form in _LIBRARIES:
+        words, library = _LIBRARIES[form]
+        with nvh_library(words):
+            if find_spec(library) is None:
+                raise ImportError(f"No module named {library!r}")
 
 
 def _told(signals: Iterable[Signal], progress: Progress, steps: int) -> Iterator[Signal]:

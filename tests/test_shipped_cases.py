@@ -2,6 +2,7 @@
 
 import json
 import os
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -18,6 +19,32 @@ ENVIRONMENT = os.environ | {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}
 def femgear(*words):
     command = [sys.executable, "-m", "femgear.cli", *map(str, words)]
     return subprocess.run(command, capture_output=True, text=True, env=ENVIRONMENT, timeout=1200)
+
+
+QUICK = "spur_pair", "published_four_stages", "helical_30_20_70", "own_chain"
+"""Cases whose run takes a few seconds without pictures."""
+SCREEN = 45
+"""Lines of 80 columns that a run without --verbose has at most."""
+
+
+def lines_on_a_terminal(case, out, *options):
+    """What a run prints on a terminal of 80 columns, but for the bars of its progress."""
+    words = ("run", case, "-o", out, *options)
+    command = [sys.executable, "-m", "femgear.cli", *map(str, words)]
+    terminal = {"TTY_COMPATIBLE": "1", "TTY_INTERACTIVE": "0", "COLUMNS": "80", "NO_COLOR": "1"}
+    said = subprocess.run(command, capture_output=True, text=True, env=ENVIRONMENT | terminal, timeout=1200)
+    assert said.returncode == 0, said.stderr
+    lines = re.sub("\x1b\\[[^a-zA-Z]*[a-zA-Z]", "", said.stdout + said.stderr).splitlines()
+    return [line for line in lines if "%" not in line or "0:" not in line]
+
+
+@pytest.mark.parametrize("name", QUICK)
+def test_a_run_is_told_on_one_screen(name, tmp_path):
+    case = CASES[0].parent / f"{name}.toml"
+    lines = lines_on_a_terminal(case, tmp_path / "run", "--no-pictures")
+    text = "".join(lines)
+    assert len(lines) <= SCREEN and max(map(len, lines)) <= 80 + len(str(tmp_path)), lines
+    assert "Can the numbers be relied on?" in text and "results: " in text
 
 
 @pytest.mark.slow

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import sys
 import textwrap
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Literal
@@ -13,7 +15,7 @@ import femgear
 from femgear.commands.files import need_new_files, write_case_file
 from femgear.commands.program import Whole, app
 from femgear.commands.terminal import Progress, print_findings, say
-from femgear.errors import CaseError
+from femgear.errors import CaseError, FemgearError, printable
 from femgear.exchange.sampling import Sampling
 
 
@@ -216,6 +218,8 @@ def export(
 ) -> int:
     """Write the numbers of a run, or a model of its vibration, as files that other programs read.
 
+    Files that cannot be are left out; the exit code is then that of the first reason.
+
     Parameters
     ----------
     folder
@@ -223,38 +227,60 @@ def export(
     output
         Folder of the numbers. Default: exported, inside the other.
     """
-    from femgear.run import export_results
+    from femgear.run import export_results, refused_formats
     from femgear.storage.files import list_own, own_files
     from femgear.storage.results import EXPORTED, additions, folder_lock
     from femgear.trains.reading import open_results
 
     named = [name for name, wanted in vars(formats or Formats()).items() if wanted]
+    refused = dict[str, FemgearError]()
     if models is not None and models.paths:
-        _write_models(folder, models)
+        refused |= _write_models(folder, models)
         if not named:
-            return 0
+            return _tell_refused(refused)
     if not named:
         options = ", ".join(f"--{name}" for name in (*vars(Formats()), "state-space", "fmu", "stiffness-table"))
         raise CaseError("no format is named", code="E-ARGUMENTS", limit=options, remedy="femgear export --help")
-    wanted = named, sampling or Sampling()
+    results = open_results(folder)  # refused before another folder is touched
+    of_formats = refused_formats(results, named)
+    refused |= {f"--{form}": error for form, error in of_formats.items()}
+    wanted = [form for form in named if form not in of_formats], sampling or Sampling()
+    if not wanted[0]:
+        return _tell_refused(refused)
     if output is None:
         with folder_lock(folder), additions(folder) as new, Progress() as progress:
             list_own(new / EXPORTED)
             names = export_results(open_results(folder), new / EXPORTED, *wanted, progress=progress)
     else:
-        results = open_results(folder)  # refused before the other folder is touched
         own_files(output, ())
         with Progress() as progress:
             names = export_results(results, output, *wanted, progress=progress)
     say(f"files in {output or folder / EXPORTED}: {', '.join(names)}")
-    return 0
+    return _tell_refused(refused)
 
 
-def _write_models(source: Path, wanted: ModelFiles) -> None:
-    """Write the models of a case file, or of the case of a run."""
-    from femgear.exchange.dynamic_model import HARMONICS, check_ending, write_state_space, write_stiffness_table
+def _tell_refused(refused: Mapping[str, FemgearError]) -> int:
+    """Say which files are not written, and raise the reason of the first; 0 of none."""
+    if not refused:
+        return 0
+    say(f"not written: {', '.join(refused)}")
+    first, *others = refused.values()
+    for error in {str(error): error for error in others if str(error) != str(first)}.values():
+        print(printable(str(error)), file=sys.stderr)
+    raise first
+
+
+def _write_models(source: Path, wanted: ModelFiles) -> dict[str, FemgearError]:
+    """Write the models of a case file, or of the case of a run; returns the refusals of those that cannot be."""
+    from femgear.exchange.dynamic_model import (
+        HARMONICS,
+        check_ending,
+        table_harmonics,
+        write_state_space,
+        write_stiffness_table,
+    )
     from femgear.exchange.fmu import write_fmu
-    from femgear.run import dynamic_model, stiffness_table
+    from femgear.run import dynamic_model, run_harmonics, stiffness_table
     from femgear.trains.reading import open_results, read_case
 
     for option, path in wanted.paths.items():
@@ -263,15 +289,31 @@ def _write_models(source: Path, wanted: ModelFiles) -> None:
     of_run = open_results(source) if source.is_dir() else None
     case = read_case(source) if of_run is None else of_run.case
     harmonics = HARMONICS if wanted.harmonics is None else wanted.harmonics
+    paths, refused, kept = dict(wanted.paths), dict[str, FemgearError](), None
+    table_path = paths.pop("--stiffness-table", None)
     with Progress() as progress:
-        if wanted.state_space is not None or wanted.fmu is not None:
-            model = dynamic_model(case, progress=progress)
-            if wanted.state_space is not None:
-                write_state_space(model, wanted.state_space, harmonics=harmonics)
-            if wanted.fmu is not None:
-                write_fmu(model, wanted.fmu, harmonics=harmonics, version=wanted.fmi)
-        if wanted.stiffness_table is not None:
-            table = stiffness_table(case if of_run is None else of_run, progress=progress)
-            write_stiffness_table(table, wanted.stiffness_table)
-    for path in wanted.paths.values():
-        say(f"written: {path}")
+        if paths:
+            try:
+                model = dynamic_model(case, progress=progress)
+            except FemgearError as error:
+                refused |= dict.fromkeys(paths, error)
+            else:
+                kept = table_harmonics(model, harmonics)
+                if wanted.state_space is not None:
+                    write_state_space(model, wanted.state_space, harmonics=harmonics)
+                if wanted.fmu is not None:
+                    write_fmu(model, wanted.fmu, harmonics=harmonics, version=wanted.fmi)
+        if table_path is not None:
+            try:
+                table = stiffness_table(case if of_run is None else of_run, progress=progress)
+                write_stiffness_table(table, table_path)
+            except FemgearError as error:
+                refused["--stiffness-table"] = error
+    for option, path in wanted.paths.items():
+        if option not in refused:
+            say(f"written: {path}")
+    if kept is not None:
+        of_speeds = {} if of_run is None else run_harmonics(of_run)
+        words = ", ".join(f"{count} at {speed:,.4g} rpm" for speed, count in of_speeds.items())
+        say(f"mesh harmonics in its tables: {kept}, of the run: {words or 'as many as its excitation reaches'}")
+    return refused

@@ -13,7 +13,15 @@ from cyclopts import Parameter
 
 from femgear.commands.files import results_folder
 from femgear.commands.program import app
-from femgear.commands.terminal import Progress, print_blocks, print_briefly, print_data, print_findings, say
+from femgear.commands.terminal import (
+    Progress,
+    print_blocks,
+    print_briefly,
+    print_data,
+    print_warnings,
+    say,
+    warning_lines,
+)
 from femgear.errors import CaseError, FemgearError
 
 if TYPE_CHECKING:
@@ -121,7 +129,7 @@ def run(
     force
         Replace the results that the folder holds, once the new ones are complete.
     verbose
-        Print the tables of all stages.
+        Print the tables of all stages, and all warnings in full on a terminal too.
     json
         Print what decides as data, and nothing else on standard output (docs/command_line.md).
     """
@@ -145,21 +153,22 @@ def run(
     check_case(data, only)  # refuse before the folder is touched
     output = output or results_folder(case)
     train = train_of(data)
-    print_findings(train.case_warnings(data))
+    warned = print_warnings(warning_lines(train.case_warnings(data), whole=verbose))
     place = run_folder(output, case=data.source, force=force)
     with resumable(output, completed_since_now(output)):
         with place as folder, Progress() as progress:
 
             def tell_numbers(results) -> None:
                 """Print what was found, before anything is drawn."""
+                lines = warning_lines(train.result_warnings(results), whole=verbose)
                 with progress.aside():
                     if not json:
                         if verbose:
                             print_blocks(train.describe_results(results))
                         else:
-                            print_briefly(train.describe_briefly(results, only))
-                    print_findings(train.result_warnings(results))
-                    sys.stdout.flush()
+                            print_briefly(train.describe_briefly(results, only), warned + len(lines))
+                        sys.stdout.flush()
+                    print_warnings(lines)
                 if pictures:
                     load_xarray()
 

@@ -8,13 +8,19 @@ import textwrap
 import threading
 import time
 from collections.abc import Iterator, Sequence
+from typing import TYPE_CHECKING
 
 from femgear.errors import printable
 
+if TYPE_CHECKING:
+    from femgear.findings import Finding
+
 SILENCE = 10.0
 """Longest time without a line where standard error is a file or a pipe [s]."""
-_BRIEF, _LEAST_ROWS = 40, 1
-"""Lines that a run prints of its tables, and rows that are left of the longest one."""
+_SCREEN, _LAST_WORDS, _LEAST_ROWS = 45, 3, 1
+"""Lines of a run on a terminal, those of them that say where its results are, and rows left of the longest table."""
+_MOST_WARNINGS, _WARNING_LINES = 3, 2
+"""Warnings of a case, and of its results, that a run shows on a terminal, and lines of each."""
 
 
 class Progress:
@@ -85,19 +91,25 @@ def print_blocks(blocks) -> None:
     sys.stdout.write(_as_text(blocks))
 
 
-def print_briefly(blocks) -> None:
-    """Print blocks in `_BRIEF` lines, if that leaves `_LEAST_ROWS` of the longest table, whose last rows go."""
+def print_briefly(blocks, warned: int = 0) -> None:
+    """Print blocks in the lines of a screen that so many lines of warnings leave; the first block stays whole.
+
+    Of the longest of the others the last rows go, but for `_LEAST_ROWS`, then its last notes.
+    """
     from dataclasses import replace
 
     from femgear.report.tables import merged
 
-    blocks = [replace(block, rows=tuple(merged(block.rows))) for block in blocks]
-    longest = max(range(len(blocks)), key=lambda number: len(blocks[number].rows))
+    blocks, room = [replace(block, rows=tuple(merged(block.rows))) for block in blocks], _SCREEN - _LAST_WORDS - warned
+    longest = max(range(len(blocks) > 1, len(blocks)), key=lambda number: len(blocks[number].rows))
     whole = blocks[longest]
-    while (text := _as_text(blocks)).count("\n") > _BRIEF and len(blocks[longest].rows) > _LEAST_ROWS:
-        rows = blocks[longest].rows[:-1]
-        more = f"{len(whole.rows) - len(rows)} more by --verbose"
-        blocks[longest] = replace(whole, rows=rows, notes=(more, *whole.notes))
+    rows, notes = list(whole.rows), list(whole.notes)
+    while (text := _as_text(blocks)).count("\n") > room and (len(rows) > _LEAST_ROWS or notes):
+        (rows if len(rows) > _LEAST_ROWS else notes).pop()
+        left = len(whole.rows) - len(rows), len(whole.notes) - len(notes)
+        texts = [f"{left[0]} more"] * bool(left[0]) + [f"{left[1]} note{'s' * (left[1] > 1)}"] * bool(left[1])
+        more = f"{' and '.join(texts)} by --verbose"
+        blocks[longest] = replace(whole, rows=tuple(rows), notes=(more, *notes))
     sys.stdout.write(text)
 
 
@@ -170,6 +182,44 @@ def print_data(data: object) -> None:
     import json
 
     print(json.dumps(data, indent=2, ensure_ascii=False, allow_nan=False))
+
+
+def warning_lines(findings: Sequence[Finding], *, whole: bool = False) -> tuple[str, ...]:
+    """Write the findings of a run as warnings: all in full, on a terminal the most severe ones in few lines.
+
+    Parameters
+    ----------
+    findings : sequence of Finding
+    whole : bool
+        Whether they are wanted in full on a terminal too.
+    """
+    from rich.console import Console
+
+    from femgear.findings import by_severity
+
+    console = Console(stderr=True)
+    texts = [f"warning: {printable(str(finding))}" for finding in findings]
+    if whole or not console.is_terminal:
+        return tuple(texts)
+    shown, others = by_severity(findings)[:_MOST_WARNINGS], by_severity(findings)[_MOST_WARNINGS:]
+    lines = list[str]()
+    for finding in shown:
+        text = f"warning: {printable(str(finding))}"
+        lines += textwrap.wrap(text, console.width, max_lines=_WARNING_LINES, placeholder=" ...")
+    if others:
+        codes = ", ".join(dict.fromkeys(finding.code for finding in others if finding.code))
+        more = f"warning: {len(others)} more{f' ({codes})' if codes else ''}, in full by --verbose and on the page"
+        lines += textwrap.wrap(more, console.width, max_lines=1, placeholder=" ...")
+    return tuple(lines)
+
+
+def print_warnings(lines: Sequence[str]) -> int:
+    """Print lines of warnings on standard error; returns how many of them a terminal has."""
+    from rich.console import Console
+
+    for line in lines:
+        print(line, file=sys.stderr)
+    return len(lines) if Console(stderr=True).is_terminal else 0
 
 
 def print_findings(findings) -> None:

@@ -145,6 +145,12 @@ def mesh_tables(model: DynamicModel, harmonics: int = HARMONICS) -> MeshTables:
     return MeshTables(np.arange(POINTS * count) * excitation.periods / (POINTS * count), *tables)
 
 
+def table_harmonics(model: DynamicModel, harmonics: int) -> int:
+    """Count the mesh harmonics of the tables of a model of which so many are wanted: no more than its record has."""
+    excitation = model.excitation
+    return min(harmonics, (excitation.stiffness.shape[1] - 1) // 2 // excitation.periods)
+
+
 def write_state_space(model: DynamicModel, path: Path, *, harmonics: int = HARMONICS) -> None:
     """Write matrices and tables of a model as arrays of NumPy (.npz) or MATLAB (.mat), by the ending of the name.
 

@@ -587,7 +587,7 @@ def modes_dataset(
     rigid = "nodal diameter: -1, the ring is rigid"
     variables["nodal_diameter"] = ("mode", modes.nodal_diameter, "1", rigid)
     variables |= shape_entries(shape, stiffness, deflection, along)
-    coords = coordinates(mode=np.arange(len(modes.frequency)), dof=dofs, mesh=gears.mesh_names)
+    coords = coordinates(mode=np.arange(1, len(modes.frequency) + 1), dof=dofs, mesh=gears.mesh_names)
     named = {"title": attrs["title"], "unknowns": len(modes.shape)}
     return Contents(variables, coords=coords, attrs=named | attrs)
 

@@ -415,7 +415,7 @@ class Train:
         return joined_sentence(judgements), judgements
 
     def describe_briefly(self, results: Results, only: str | None = None) -> tuple[Block, ...]:
-        """Tabulate what page one answers, the verdict and the findings of a run, and one stage if that was asked for.
+        """Tabulate what page one answers, and the verdict of a run or one stage if that was asked for.
 
         Trains without judgements have all their tables.
         """
@@ -429,7 +429,6 @@ class Train:
         return (
             *describe_judgements(f"{self.duty(results.case)} {sentence}".strip(), judgements),
             *(numbers or decided),
-            *listed(results.findings),
         )
 
     def describe_stages(self, results: Results) -> dict[str, Block]:

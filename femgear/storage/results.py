@@ -69,7 +69,7 @@ _COORDINATES = {
     "harmonic": ("1", "harmonic of the mesh frequency"),
     "member": ("1", "member"),
     "mesh": ("1", "gear mesh"),
-    "mode": ("1", "mode"),
+    "mode": ("1", "mode, from 1"),
     "planet": ("1", "planet"),
     "position": ("1", "position in mesh periods"),
     "speed": ("rpm", "speed of the input"),

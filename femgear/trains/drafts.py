@@ -107,6 +107,9 @@ CentreDistance = Annotated[float, Quantity(LENGTH, 1e-4, 20.0)]
 _HEAD = "Written by femgear new {}. What is estimated says so: give what is known instead."
 _STANDS = " The casing stands still: [casing] and its feet let it move (docs/gearbox.md)."
 _LEAVE = " Masses and inertias stay when teeth change: delete their lines to have them estimated anew."
+_STRENGTH = (
+    'For safeties and lives give [material] a treatment and a hardness, such as "case hardened steel" and 700 (HV).'
+)
 _USUAL = {
     "W-BACKLASH": "the same backlash in all meshes",
     "W-CLEARANCE": "a tip clearance of 0.1 modules",
@@ -267,7 +270,7 @@ def _has_normal_section(tables: dict[str, object], beta: float) -> bool:
 
 def _head(kind: str, left: list[str], lacks: tuple[str, ...], form: ToothForm) -> list[str]:
     """Paragraphs before the first entry: what is assumed, and what teeth lack whatever their shifts."""
-    head = [_HEAD.format(kind) + {"drivetrain": _STANDS, "gearbox": _STANDS}.get(kind, _LEAVE)]
+    head = [_HEAD.format(kind) + {"drivetrain": _STANDS, "gearbox": _STANDS}.get(kind, _LEAVE), _STRENGTH]
     head += [f"Assumed: {' '.join(left)}"] if left else []
     if lacks:
         place = "" if form.centre_distance is None else " at this centre distance"

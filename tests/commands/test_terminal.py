@@ -8,6 +8,7 @@ from command_stand_ins import Narrow
 from rich.console import Console
 
 from femgear.commands import terminal
+from femgear.findings import Finding
 from femgear.report.tables import Block, merged
 
 
@@ -103,10 +104,40 @@ def test_a_run_is_told_in_few_lines_of_80_columns(monkeypatch, capsys):
     blocks = [Block("answers", rows=answers), Block("numbers", rows=numbers, notes=("a note",))]
     terminal.print_briefly(blocks)
     printed = capsys.readouterr().out.splitlines()
-    assert len(printed) <= 40 and max(map(len, printed)) <= 80
+    # three more say where the results are
+    assert len(printed) <= 42 and max(map(len, printed)) <= 80
     left = sum("row " in line for line in printed)
     at = next(i for i, line in enumerate(printed) if "more by --verbose" in line)
     assert 1 < left < 30 and printed[at] == f"  {30 - left} more by --verbose" and "a note" in printed[at + 1]
     assert "question 4" in "".join(printed)
+    # warnings take lines of the tables; the answers stay, and the last notes go
+    terminal.print_briefly(blocks, warned=25)
+    printed = capsys.readouterr().out
+    assert len(printed.splitlines()) <= 42 - 25 and "question 4" in printed and "a note" not in printed
+    assert "29 more and 1 note by --verbose" in printed
     terminal.print_briefly([Block("numbers", rows=numbers[:3])])
     assert "--verbose" not in capsys.readouterr().out
+
+
+def test_warnings_of_a_run_are_few_lines_on_a_terminal_and_whole_elsewhere(monkeypatch, capsys):
+    """Of a note, four doubts and a fault the most severe stand there, each in two lines."""
+    long = "the excitation ends below what levels need " * 6
+    codes = "W-TIP", "W-TAIL", "W-PULL", "W-KINK", "W-LIFE", "W-EDGE"
+    findings = [Finding(code, "entry", long) for code in codes]
+    whole = terminal.warning_lines(findings)
+    assert whole == tuple(f"warning: {finding}" for finding in findings)
+    assert terminal.print_warnings(whole) == 0 and len(capsys.readouterr().err.splitlines()) == 6
+
+    class Narrow(Console):
+        is_terminal = True
+
+        def __init__(self, **options):
+            super().__init__(**options, width=80)
+
+    monkeypatch.setattr("rich.console.Console", Narrow)
+    lines = terminal.warning_lines(findings)
+    assert len(lines) == 7 and max(map(len, lines)) <= 80
+    starts = [line for line in lines if line.startswith("warning: [")]
+    assert [line[10:].partition("]")[0] for line in starts] == ["W-LIFE", "W-TAIL", "W-PULL"]
+    assert lines[-1] == "warning: 3 more (W-KINK, W-EDGE, W-TIP), in full by --verbose and on the page"
+    assert terminal.warning_lines(findings, whole=True) == whole and terminal.print_warnings(lines) == 7

@@ -246,7 +246,7 @@ class ModesResult(StageResult):
             coords={
                 "other_mesh": ("other_mesh", names, "1", "gear mesh"),
                 "supported_position": ("supported_position", state.position, "1", denser),
-                **coordinates(mode=np.arange(len(modes.frequency)), dof=modes.dofs, mesh=names),
+                **coordinates(mode=np.arange(1, len(modes.frequency) + 1), dof=modes.dofs, mesh=names),
                 **coordinates(circumferential=diameters),
                 **factors,
             },

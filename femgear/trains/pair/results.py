@@ -96,7 +96,7 @@ class PairModesResult(StageResult):
         modes, play = self.modes, self.excitation.backlash
         shapes = shape_entries(modes.shape, modes.mesh_stiffness, modes.mesh_deflection)
         variables = mode_entries(modes) | shapes | {"backlash": ("mesh", play, *_PLAY)}
-        axes = {"mode": np.arange(len(modes.frequency)), "dof": modes.dofs, "mesh": self.gears.mesh_names}
+        axes = {"mode": np.arange(1, len(modes.frequency) + 1), "dof": modes.dofs, "mesh": self.gears.mesh_names}
         title = "modes of the pair with its mean mesh stiffness"
         return Contents(variables, coordinates(**axes), {"title": title})
 
