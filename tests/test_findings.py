@@ -626,7 +626,7 @@ def test_a_finding_of_a_run_is_in_manifest_file_page_table_and_on_standard_error
     results = open_results(out)
     (finding,) = (one for one in results.findings if one.code == "W-DEFLECTION")
     assert (finding.severity, finding.stage) == ("doubt", "static")
-    assert f"warning: {finding}" in printed.err.splitlines() and "doubt W-DEFLECTION" in printed.out
+    assert f"warning: {finding}" in printed.err.splitlines() and "large deflections (W-DEFLECTION)" in printed.out
     manifest = json.loads((out / "manifest.json").read_text(encoding="utf-8"))
     assert manifest["findings"] == as_data(results.findings)
     of_stages = once(one for one in results.findings if one.stage)
@@ -641,6 +641,7 @@ def test_a_finding_of_a_run_is_in_manifest_file_page_table_and_on_standard_error
     assert cli.main(["report", str(out)]) == 0
     assert (out / "report.html").read_text(encoding="utf-8") == page
     capsys.readouterr()
+    assert cli.main(["report", str(out), "--verbose"]) == 0 and "doubt W-DEFLECTION" in capsys.readouterr().out
 
 
 def test_a_folder_of_the_former_format_says_that_its_warnings_are_not_known(tmp_path):

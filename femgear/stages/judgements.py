@@ -35,7 +35,7 @@ FAULTY, STRONG, LIFE, HEAT, SMOOTH, QUIET, SURE = (
 
 _RAISED = 0.5
 """Change of a level by a longer excitation from which on the higher one is compared with the limit too [dB]."""
-MOST_DOUBTS = 3
+MOST_DOUBTS = 4
 """Doubts that the card of the numbers names."""
 _BEYOND = "W-PRESSURE", "W-STRENGTH"
 """Codes of the findings that no steel carries the load."""

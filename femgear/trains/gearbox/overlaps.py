@@ -107,7 +107,8 @@ def common_faces(case: GearboxCase) -> Iterator[Finding]:
                         f"gears of {stage.name} face each other on {LENGTH.show(common)} of {LENGTH.show(min(widths))}:"
                         " stiffness and stresses of their teeth are those of the whole width"
                     )
-                    key, remedy = f"{kind}[{number}].{entry}", "correct the positions, or give the common face width"
+                    shift = LENGTH.show(round(abs(first - second) - 0.5 * abs(widths[0] - widths[1]), 9))
+                    key, remedy = f"{kind}[{number}].{entry}", f"move one of them by {shift} towards the other"
                     yield Finding("W-WIDTHS", key, text, remedy=remedy, severity=DOUBT)
 
 

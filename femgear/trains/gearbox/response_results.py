@@ -378,7 +378,11 @@ def _by_longer(response: GearboxResponse, longer: GearboxResponse, moved: dict[s
 def _end_of_excitation(data: xr.Dataset) -> tuple[str, str]:
     """Entry that ends the excitation, and what to do about it."""
     few = bool(data.attrs.get("most_harmonics"))
-    return ("dynamics.mesh_harmonics", "take more of them") if few else ("dynamics.up_to", "take a higher frequency")
+    if not few:
+        return "dynamics.up_to", "take a higher frequency"
+    # of four stages without teeth K_v still grows from 200 mesh harmonics to 400
+    jumps = "stages without teeth have a stiffness that jumps, for which no number may be enough: give their teeth"
+    return "dynamics.mesh_harmonics", f"take more of them; {jumps}"
 
 
 def _short_excitation(data: xr.Dataset, number: int, stage: str) -> Iterator[Finding]:

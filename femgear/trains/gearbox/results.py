@@ -49,6 +49,7 @@ from femgear.trains.gearbox.modes import GearboxModes
 from femgear.trains.gearbox.overlaps import common_faces, overlaps
 from femgear.trains.gearbox.planet_shafts import standing_planets
 from femgear.trains.gearbox.play import beyond_play, play_findings, slack_bearings
+from femgear.trains.gearbox.power import port_shafts
 from femgear.trains.gearbox.sensors import (
     describe_sensors,
     modal_sensor_variables,
@@ -635,7 +636,8 @@ def gearbox_warnings(case: GearboxCase) -> Iterator[Finding]:
     """List what of a gearbox case deserves a look: how it was read, entries without effect, bodies that overlap."""
     yield from case.notices
     if not any(any(load_case.torque.values()) for load_case in case.operation.load_case):
-        text, remedy = "no load case has a torque: no teeth carry any", 'give one, as in torque = {motor = "35 N m"}'
+        text, end = "no load case has a torque: no teeth carry any", next(iter(port_shafts(case)), "motor")
+        remedy = f'give one, as in torque = {{ "{end}" = "35 N m" }}'
         yield Finding("W-LOAD", "operation.load_case", text, remedy=remedy)
     if not case.deflection.contact and any(stage.teeth is not None for stage in (*case.pair, *case.planetary)):
         text = "without contact meshes have the stiffness of ISO 6336-1, and no K_Hbeta"
