@@ -45,6 +45,12 @@ _WHOLE = 1e-6
 NEW_LINES = ("whole orders", "between whole orders")
 """Lines that no healthy set of equal planets has, by where they lie."""
 _TOOTH = 3
+_MARKS = (
+    {"marker": "o", "markersize": 12.0, "fillstyle": "none", "linewidth": 3.5},
+    {"marker": "s", "markersize": 8.0, "fillstyle": "none", "linewidth": 2.0},
+    {"marker": "^", "markersize": 4.5, "linewidth": 1.0},
+)
+"""Marks and lines of the gears: those that are drawn later leave the earlier ones to be seen around them."""
 
 
 @dataclass(frozen=True)
@@ -225,10 +231,12 @@ def draw_limits(limits: Sequence[FaultLimit]) -> Figure:
     for number, (kind, ax) in enumerate(zip(kinds, axes, strict=False)):
         ax.axhline(0.0, color="black", linewidth=0.8)
         for i, limit in enumerate(limit for limit in limits if limit.kind == kind):
-            ax.plot(1e3 * limit.size, limit.excess, marker="o", label=limit.gear, **line_style(i))
+            ax.plot(1e3 * limit.size, limit.excess, label=limit.gear, **_MARKS[i % len(_MARKS)], **line_style(i))
         # a fault that never stands out is a line at zero, not an axis of nothing
         levels = np.concatenate([[0.0, 1.0], *(limit.excess for limit in limits if limit.kind == kind)])
         low, high = float(np.nanmin(levels)), float(np.nanmax(levels))
+        if high <= 1.0:
+            ax.annotate("none of these stands out", (0.5, 0.5), xycoords="axes fraction", ha="center")
         ax.set_ylim(low - 0.05 * (high - low), high + 0.1 * (high - low))
         ax.set_xscale("log")
         sizes = sorted({1e3 * float(size) for limit in limits if limit.kind == kind for size in limit.size})
