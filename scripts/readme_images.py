@@ -108,7 +108,6 @@ RUNS = {
     "faults": Run(
         "femgear faults cases/planetary_27_40_108.toml --tolerances cases/tolerances/still.toml --limits 3 --seed 7",
         "Reference set, sizes from which on faults stand out",
-        entry=("positions = 64 ", "flank_elements = 8\npositions = 8 "),
         says={"limits": "Level by which faults of sun, planet and ring stand out of healthy sets, over their size"},
     ),
     "in_a_casing": _case("in_a_casing", "Reference set in a casing of a file", HOUSING),

@@ -195,7 +195,7 @@ def _broken_tip(section: FaultSection, gear: Gear, place: dict[str, Any]) -> Bro
             code="E-FAULT",
             key="length",
             value=_mm(section.length),
-            limit=f"less than {_mm(most)}",
+            limit=f"less than {_mm_down(most)}",
             remedy='reduce it, or write kind = "missing"',
         )
     return BrokenTip(**place, roll=_roll(gear, radius), internal=gear.internal)
@@ -213,7 +213,7 @@ def _across(section: FaultSection, gear: Gear, face_width: float) -> tuple[float
             code="E-FAULT",
             key="width",
             value=_mm(section.width),
-            limit=f"up to {_mm(most)} at this offset; teeth mesh over {_mm(face_width)}",
+            limit=f"up to {_mm_down(most)} at this offset; teeth mesh over {_mm(face_width)}",
             remedy="reduce width or offset, or leave both out for a spall across all",
         )
     if 2.0 * half > face_width - _ON_END * gear.module:
@@ -259,7 +259,7 @@ def _check_on_flank(gear: Gear, middle: float, length: float) -> None:
         code="E-FAULT",
         key="length",
         value=_mm(length),
-        limit=f"up to {_mm(2.0 * min(below, above))} about this diameter; the whole flank is {_mm(below + above)} long",
+        limit=f"up to {_mm_down(2.0 * min(below, above))} about this diameter; the flank is {_mm(below + above)} long",
         remedy=[*remedies, 'write kind = "broken corner"'] if over_tip else remedies,
     )
 
@@ -286,7 +286,7 @@ def _check_thickness(gear: Gear, radius: float, depth: float, key: str, words: s
             code="E-FAULT",
             key=key,
             value=_mm(depth),
-            limit=f"less than {_mm(thickness)}, as thick as the tooth is there",
+            limit=f"less than {_mm_down(thickness)}, as thick as the tooth is there",
             remedy='reduce it, or write kind = "broken corner" or "missing"',
         )
 
@@ -377,6 +377,11 @@ def _against(gear: Gear, words: str, earlier: str, later: str) -> GeometryError:
 def _roll(gear: Gear, radius: float) -> float:
     """Roll length [m] of a radius [m]."""
     return float(np.sqrt(max(radius**2 - gear.base_radius**2, 0.0)))
+
+
+def _mm_down(length: float) -> str:
+    """Write a largest length [m] so that what is printed is allowed: the hundredth of a micrometre below it."""
+    return f"{math.floor(1e8 * length * (1.0 + 1e-12)) / 1e5:.9g} mm"
 
 
 def _mm(length: float) -> str:

@@ -24,6 +24,8 @@ _TIP_SHARE, _FINEST, _GROWTH = 0.01, 1e-3, 0.25
 """Element edge at the tip of the crack, over its depth and at least over the module; growth of edges away from it."""
 _LEAST = 0.05
 """Depth of a crack over the module, at least: fifty of the finest edges, and some 0.1 % of the tooth's compliance."""
+_ROUNDED = 1e-9
+"""Part of a depth that is rounding."""
 _MOST = 0.85
 """Depth of a crack over the length of the section that it lies in."""
 _TANGENT = {False: math.radians(30.0), True: math.radians(60.0)}
@@ -84,7 +86,7 @@ def cracked_outline(
     inwards = 1.0 if gear.internal else -1.0
     direction = np.array([inwards * math.cos(angle), -math.sin(angle)])
     end, section = _opposite(curves, mouth, direction)
-    if not depth >= _LEAST * gear.module:
+    if not depth >= _LEAST * gear.module * (1.0 - _ROUNDED):
         raise GeometryError(
             f"{gear.name}: a crack of {1e3 * depth:.4g} mm is shorter than the grid of its tooth can show",
             code="E-FAULT",
@@ -99,7 +101,8 @@ def cracked_outline(
             code="E-FAULT",
             key="depth",
             value=f"{1e3 * depth:.4g} mm",
-            limit=f"up to {1e3 * _MOST * section:.4g} mm at this angle",
+            # what is printed may be typed
+            limit=f"up to {math.floor(1e6 * _MOST * section) / 1e3:.6g} mm at this angle",
             remedy='reduce it, or write kind = "missing"',
         )
     tip = mouth + depth * direction

@@ -177,7 +177,8 @@ def _size_words(section: FaultSection) -> str:
         case "broken corner":
             return f"tip broken off by {1e3 * length:.4g} mm"
         case "spall":
-            return f"pit of {1e3 * length:.4g} mm, {1e6 * depth:.4g} µm deep"
+            wide = "" if section.width is None else f"{1e3 * section.width:.4g} mm wide, "
+            return f"pit of {1e3 * length:.4g} mm, {wide}{1e6 * depth:.4g} µm deep"
         case "wear":
             return f"worn by {1e6 * max((depth, *(section.depths or ()))):.4g} µm"
         case _:

@@ -1,5 +1,6 @@
 """Faults of teeth in a case file: what belongs together, and places that a tooth has not."""
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -160,7 +161,7 @@ def refusals(healthy, *faults, gear="sun"):
         # over the tip by a fifth of a millimetre, and as far below the flank
         ({"diameter": "44.4 mm", "length": "1 mm"}, "length", "over the tip", "up to 0."),
         ({"diameter": "39.6 mm", "length": "1 mm"}, "length", "below the flank", "up to 0."),
-        ({"length": "20 mm"}, "length", "below the flank", "the whole flank is 3.3091 mm long"),
+        ({"length": "20 mm"}, "length", "below the flank", "the flank is 3.3091 mm long"),
         ({"depth": "40 mm"}, "depth", "leaves no tooth", "as thick as the tooth is"),
     ],
 )
@@ -240,3 +241,28 @@ def test_wear_of_no_depth_anywhere_is_none(healthy):
     points = {"depths": ["0 um", "0 um"], "diameters": ["41 mm", "43 mm"]}
     none = {"kind": "wear", "flank": "left", "tooth": 3} | points
     assert set_deviations(with_values(healthy, {"sun.fault": [none]})).ideal
+
+
+@pytest.mark.parametrize(
+    ("fault", "key"),
+    [
+        (CRACK | {"depth": "9 mm"}, "depth"),
+        (CRACK | {"depth": "0.01 mm"}, "depth"),
+        (SPALL | {"length": "9 mm"}, "length"),
+        (SPALL | {"diameter": "44.8 mm", "length": "9 mm"}, "length"),
+        (SPALL | {"depth": "9 mm"}, "depth"),
+        (CORNER | {"length": "9 mm"}, "length"),
+    ],
+)
+@pytest.mark.parametrize("gear", ["sun", "ring"])
+def test_the_limit_that_a_refusal_names_may_be_typed(healthy, fault, key, gear):
+    ring = (
+        {"diameter": f"{float(fault['diameter'][:-3]) + 119.4:g} mm"} if gear == "ring" and "diameter" in fault else {}
+    )
+    (problem,) = refusals(healthy, fault | ring, gear=gear)
+    (limit,) = re.findall(r"([\d.]+) mm(?: or more| at this| about this|, as thick|$)", problem.limit)
+    at_most = with_values(healthy, {f"{gear}.fault": [fault | ring | {key: f"{limit} mm"}]})
+    if "less than" in problem.limit:
+        below = f"{0.9999 * float(limit):.9g} mm"
+        at_most = with_values(healthy, {f"{gear}.fault": [fault | ring | {key: below}]})
+    assert len(set_deviations(at_most).faults) == 1
