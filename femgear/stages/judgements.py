@@ -398,7 +398,7 @@ def judge_smoothness(answer: str, results: Any, stages: Sequence[str]) -> Judgem
     if not present:
         return Judgement(SMOOTH, "open", answer or "not known", "no motion was computed")
     against = list(dict.fromkeys(_against(results, present)))
-    rests_on = estimates_words(results.findings)
+    rests_on = f"; {words}" if (words := estimates_words(results.findings)) else ""
     if not against and any(finding.code == "W-TAIL" and finding.severity == DOUBT for finding in results.findings):
         return _smoothness("look", answer, f"{_FEW_HARMONICS}{rests_on}")
     if not against and any(finding.code == "W-OPEN" for finding in results.findings):
@@ -414,7 +414,7 @@ def estimates_words(findings: Iterable[Finding]) -> str:
     """Say which values that vibration rests on are estimated; empty of none."""
     estimated = (finding.concerns for finding in findings if finding.code == "W-ESTIMATED")
     kinds = dict.fromkeys(filter(None, estimated))
-    return f"; rests on estimated {_and(list(kinds))}" if kinds else ""
+    return f"rests on estimated {_and(list(kinds))}" if kinds else ""
 
 
 def _smoothness(state: State, answer: str, words: str, sentence: str = "") -> Judgement:
@@ -518,6 +518,7 @@ def judge_noise(
     open_words: str = CLEAR,
     margins: Sequence[LevelMargin] = (),
     doubts: str = "",
+    rests_on: str = "",
 ) -> Judgement:
     """Judge how loud it is: by the limits of the case, else by resonances at speeds of operation.
 
@@ -535,10 +536,12 @@ def judge_noise(
         Of the levels that have a limit.
     doubts : str
         Doubts of the levels, in words: below a limit such levels deserve a look.
+    rests_on : str
+        What they rest on that is estimated, in words.
     """
 
     def doubted(*limit: str) -> str:
-        return "; ".join(filter(None, (*limit, doubts)))
+        return "; ".join(filter(None, (*limit, doubts, rests_on)))
 
     if margins:
         worst = max(margins, key=lambda margin: margin.decibels)
@@ -568,6 +571,7 @@ def judge_numbers(findings: Sequence[Finding], complete: bool) -> Judgement:
         shown = ", ".join(map(in_words, codes[:MOST_DOUBTS]))
         shown += f" and {len(codes) - MOST_DOUBTS} more" if len(codes) > MOST_DOUBTS else ""
         count = len(codes) or len(doubts)
-        return Judgement(SURE, "look", f"{count} doubt{'s' * (count > 1)}", f"{shown}{estimates_words(findings)}")
-    words = f"solutions converged, samples resolve them{estimates_words(findings)}"
-    return Judgement(SURE, "good", "no doubt was raised", words)
+        limit = "; ".join(filter(None, (shown, estimates_words(findings))))
+        return Judgement(SURE, "look", f"{count} doubt{'s' * (count > 1)}", limit)
+    limit = "; ".join(filter(None, ("solutions converged, samples resolve them", estimates_words(findings))))
+    return Judgement(SURE, "good", "no doubt was raised", limit)

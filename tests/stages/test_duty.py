@@ -71,5 +71,5 @@ def test_a_pair_and_a_gearbox():
     case = read_case(CASES / "e_axle.toml")
     text = train_of(case).duty(case)
     # 72/25 of the pair, 1 + 73/23 of the set whose ring stands
-    assert f"ratio {72 / 25 * (1 + 73 / 23):.4g}, teeth mesh at 3,750, " in text
+    assert f"ratio {72 / 25 * (1 + 73 / 23):.4g}, teeth mesh at 3,750 Hz and " in text
     assert text.endswith(" Hz, full torque, one of 2 load cases.")

@@ -65,21 +65,26 @@ def _noise(results: Any) -> Judgement:
     line_words = f"order {order:g} of the carrier"
     place = f"{origin}{hertz:,.0f} Hz{_nearest_mode(results, hertz)}"
     main = f"its largest line, {line_words} ({place}), makes {share:.0%} of the power"
-    sentence = f"At {speed:,.4g} rpm the housing has {size_words}: {main}"
+    sentence = f"At {speed:,.4g} rpm the housing has {_bound_in_words(size_words)}: {main}"
     if decisive := most_decisive(results):
         sentence += f", with half and twice of what is assumed: {decisive}"
     margins, resonance, levels = tuple(_margins(results)), "", [size_words]
     if "runup" in results.stages:
         levels.append(loudest(results.runup, marks))
-        sentence += f". Loudest of the run-up: {levels[-1]}"
+        sentence += f". Loudest of the run-up: {_bound_in_words(levels[-1])}"
         resonance = _resonance(results.runup)
     elif "modes" in results.stages:
         line_words += f" at {hertz:,.0f} Hz"
         resonance = resonance_of_line(line_words, hertz, results.modes["frequency"].values, share)
     # a bound has no mark: it is one itself
     doubts = [*([CATALOGUE["W-EXCITATION"].words] if any(map(is_bound, levels)) else []), *marks.words]
-    open_words = f"{CLEAR}{estimates_words(results.findings)}"
-    return judge_noise(answer, sentence, resonance, open_words, margins, doubt_words(doubts))
+    rests_on = estimates_words(results.findings)
+    return judge_noise(answer, sentence, resonance, CLEAR, margins, doubt_words(doubts), rests_on)
+
+
+def _bound_in_words(level: str) -> str:
+    """Write a level of which only a bound is known as one: "more than 9 m/s²"."""
+    return f"more than {level[2:]}" if is_bound(level) else level
 
 
 def _margins(results: Any) -> Iterator[LevelMargin]:

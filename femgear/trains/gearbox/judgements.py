@@ -17,6 +17,7 @@ from femgear.stages.judgements import (
     LevelMargin,
     NotRated,
     doubt_words,
+    estimates_words,
     judge_heat,
     judge_lives,
     judge_noise,
@@ -197,7 +198,8 @@ def _noise(results: Any) -> Judgement:
         sentence += f". Loudest of the run-up: {_loudest_of_run_up(results.runup, marks, name)}"
     open_words = "give sensor.level_limit, or femgear compare sets two runs beside one another"
     margins = tuple(_margins(results))
-    return judge_noise(answer, sentence, resonance, open_words, margins, doubt_words(marks.words))
+    rests_on = estimates_words(results.findings)
+    return judge_noise(answer, sentence, resonance, open_words, margins, doubt_words(marks.words), rests_on)
 
 
 def _marked(level: float, marks: Marks, stage: str) -> str:

@@ -80,4 +80,10 @@ def material_notices(data: dict, case: Any) -> Iterator[Finding]:
             }
             if of_shafts:
                 text += f", of gears on {', '.join(f'{shaft} {modulus}' for shaft, modulus in of_shafts.items())}"
-            yield Finding("W-ESTIMATED", f"{kind}[{number}].teeth.material", text, remedy="give it with the teeth")
+            yield Finding(
+                "W-ESTIMATED",
+                f"{kind}[{number}].teeth.material",
+                text,
+                remedy="give it with the teeth",
+                concerns="materials",
+            )

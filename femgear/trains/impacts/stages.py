@@ -32,7 +32,7 @@ from femgear.stages.protocol import (
 from femgear.storage.contents import Contents
 from femgear.storage.results import FOURIER, complex_entries
 from femgear.trains.impacts.case_file import GearPairCase, pair_of, scales_of
-from femgear.trains.impacts.judgements import impact_judgements
+from femgear.trains.impacts.judgements import impact_duty, impact_judgements
 from femgear.trains.impacts.model import (
     BACK,
     DRIVE,
@@ -440,6 +440,7 @@ GEAR_PAIR = Train(
     describe=_describe_case,
     warnings=_case_warnings,
     judgements=impact_judgements,
+    duty=impact_duty,
     front=(("amplitude_and_mean", 0), ("contact_states", 0)),
     figures=FiguresOf("femgear.trains.impacts.figures:FIGURES"),
 )
