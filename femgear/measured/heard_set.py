@@ -11,7 +11,7 @@ import numpy as np
 from femgear.case.gear_set import need_set, planetary_set
 from femgear.errors import CaseError
 from femgear.gears.kinematics import speeds
-from femgear.housing.orders import spacing_symmetry
+from femgear.housing.orders import part_orders, spacing_symmetry
 
 _BESIDE = 6
 """Carrier orders on either side of a mesh harmonic at which most lines of a healthy set lie."""
@@ -52,6 +52,18 @@ class HeardSet:
         """
         orders = np.arange(max(self.ring - _BESIDE, 1), int(highest) + 1)
         return np.concatenate([orders, orders[orders % spacing_symmetry(self.angles) == 0]])
+
+    def part_places(self, highest: float, tolerance: float) -> list[np.ndarray]:
+        """Find orders up to a highest at which a fault of the sun, and of one planet, has lines: arrays, ascending.
+
+        Those closer than four times the tolerance of orders are left out, as most lines would be among them.
+        """
+        parts = part_orders(self.teeth, spacing_symmetry(self.angles), tolerance)
+        return [
+            (np.arange(0, int(highest) + 1, step)[:, None] + beside).ravel()
+            for step, beside in parts
+            if 4.0 * tolerance * len(beside) < step
+        ]
 
     def symmetric_orders(self, harmonics: int) -> np.ndarray:
         """Find orders (n,) near the first mesh harmonics that the symmetry of the spacing allows, ascending."""

@@ -12,6 +12,7 @@ import numpy as np
 from femgear.case.quantities import SPEED, to_si
 from femgear.errors import CaseError
 from femgear.findings import Finding, tell
+from femgear.measured.aligned_speed import aligned_speed, widest_range
 from femgear.measured.channels import Channel, choose_channel
 from femgear.measured.csv_signals import read_csv_signals
 from femgear.measured.heard_set import HeardSet
@@ -20,11 +21,9 @@ from femgear.measured.sampled_files import read_matlab_signals, read_wav_signals
 from femgear.measured.turns import (
     AngleSignal,
     Turns,
-    aligned_speed,
     constant_turns,
     resample_turns,
     turns_of_pulses,
-    widest_range,
 )
 from femgear.measured.universal_functions import read_universal_signals
 
@@ -175,13 +174,13 @@ def _carrier_speed(signal: Channel, recording: Recording, shafts: HeardSet) -> f
 
 
 def _tell_drift(signal: Channel, speed: float, orders: np.ndarray, further: np.ndarray, within: float) -> None:
-    """Say where the speeds of both halves of a recording smear its lines over more than a step of orders."""
+    """Say where the speeds of both halves of a recording smear its lines over more orders than a step of a half."""
     half = len(signal.values) // 2
     halves = [replace(signal, values=part) for part in (signal.values[:half], signal.values[half:])]
     within = min(within, widest_range(orders))
     first, second = (aligned_speed(part, speed, orders, within, further=further) for part in halves)
     smeared = abs(first - second) / speed * float(orders[-1])
-    if smeared > 1.0 / (signal.duration * speed):
+    if smeared > 2.0 / (signal.duration * speed):
         words = f"from the first half to the second the speed changes by {abs(second / first - 1):.2%}, and order "
         words += f"{orders[-1]} is smeared over {smeared:.2g} orders"
         remedy = "record pulses, or cut the record to a part of steady speed"

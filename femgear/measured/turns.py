@@ -213,48 +213,6 @@ def constant_turns(channel: Channel, speed: float) -> Turns:
     return Turns(time, (time - time[0]) * speed)
 
 
-def widest_range(orders: np.ndarray) -> float:
-    """Find the share of a speed within which no other lines come to the places of some orders (k,), two or more."""
-    return 0.4 * float(np.diff(np.unique(orders)).min()) / float(orders.max())
-
-
-def aligned_speed(
-    channel: Channel, speed: float, orders: np.ndarray, within: float, *, further: np.ndarray | None = None
-) -> float:
-    """Find the constant speed near a nominal one [1/s] at which lines of a signal stand best at some orders.
-
-    That of the largest sum of amplitudes of the spectrum (Hann window) at the orders and at further ones; in a sum of
-    squares a single line from elsewhere may decide. At another speed loud lines of a fault may stand at orders of a
-    healthy set, but never most lines at whole orders. It is a guess as good as the speed was constant; pulses are
-    better.
-
-    CaseError: E-RANGE: a range within which the next lines would fit as well.
-
-    Parameters
-    ----------
-    orders : (k,) array
-        Orders of the shaft at which lines are expected, two of them apart by g at least.
-    within : float
-        Largest share of the nominal speed that the speed may differ by.
-    further : (m,) array, optional
-        Orders at which lines may stand too; those that come twice count twice.
-    """
-    most = widest_range(orders)
-    if not 0.0 < within <= 1.0001 * most:
-        message, remedy = "lines next to one another would fit as well", "measure the speed, or record its pulses"
-        raise CaseError(message, code="E-RANGE", key="--within", value=within, limit=f"{most:.3g}", remedy=remedy)
-    values = (channel.values - channel.values.mean()) * np.hanning(len(channel.values))
-    height = np.abs(np.fft.rfft(values, 2 * len(values)))  # twice as fine, so that no line lies between
-    step = channel.rate / (2 * len(values))
-    counted = orders if further is None else np.concatenate([orders, further])
-    count = int(np.ceil(within * speed * float(counted.max()) / (0.5 * step)))
-    speeds, score = speed * (1.0 + within * np.arange(-count, count + 1) / count), np.zeros(2 * count + 1)
-    for order in counted.tolist():
-        place = np.rint(speeds * order / step).astype(int)
-        score += np.where(place < len(height), height[np.minimum(place, len(height) - 1)], 0.0)
-    return float(speeds[score.argmax()])
-
-
 def resample_turns(channel: Channel, turns: Turns, *, parts: int = 1) -> AngleSignal:
     """Sample a signal anew at equal steps of the angle of a shaft, over all whole turns of both records.
 

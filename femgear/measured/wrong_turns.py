@@ -11,12 +11,11 @@ gains little by each of them.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
 
-from femgear.housing.orders import part_orders, spacing_symmetry
+from femgear.housing.orders import spacing_symmetry
 from femgear.measured.heard_set import HeardSet
 
 _COUNTS = (2, 3, 4, 5, 6, 8, 10, 12, 20, 24, 30, 60)
@@ -115,7 +114,7 @@ def _densities(gear_set: HeardSet, order: np.ndarray, tolerance: float, highest:
     symmetry = spacing_symmetry(gear_set.angles)
     kinds = [np.arange(symmetry, highest + 1.0, symmetry)]
     kinds += [np.arange(1.0, highest + 1.0)] * (symmetry > 1 and tolerance < 0.5)
-    kinds += _part_places(gear_set, tolerance, highest)
+    kinds += gear_set.part_places(highest, tolerance)
     densities = [np.ones(len(order))]
     for places in filter(len, kinds):
         harmonic = np.rint(places / gear_set.ring)
@@ -126,13 +125,6 @@ def _densities(gear_set: HeardSet, order: np.ndarray, tolerance: float, highest:
             ends = (np.searchsorted(places, order + tolerance, "right"), np.searchsorted(places, order - tolerance))
             densities.append((total[ends[0]] - total[ends[1]]) * highest / (2.0 * tolerance))
     return np.array(densities[1:] + densities[:1])
-
-
-def _part_places(gear_set: HeardSet, tolerance: float, highest: float) -> Iterator[np.ndarray]:
-    """Orders at which a fault of the sun, and of one planet, has lines, ascending."""
-    for step, beside in part_orders(gear_set.teeth, spacing_symmetry(gear_set.angles), tolerance):
-        if 4.0 * tolerance * len(beside) < step:
-            yield (np.arange(0, int(highest) + 1, step)[:, None] + beside).ravel()
 
 
 def _mean_logarithm(densities: np.ndarray, weight: np.ndarray) -> float:

@@ -7,7 +7,7 @@ import pytest
 
 from femgear import read_case
 from femgear.errors import CaseError
-from femgear.measured.heard_set import heard_set
+from femgear.measured.heard_set import HeardSet, heard_set
 from femgear.trains.reading import with_values
 
 CASES = Path(__file__).parents[2] / "cases"
@@ -19,6 +19,20 @@ def test_the_reference_set():
     assert heard.input == "sun" and heard.carrier_per_turn == pytest.approx({"sun": 0.2, "carrier": 1.0})
     assert heard.whole_orders(106.5).tolist() == [102, 103, 104, 105, 106, 102, 105]
     assert heard.symmetric_orders(2).tolist() == [102, 105, 108, 111, 114, 210, 213, 216, 219, 222]
+
+
+def test_faults_of_parts_have_lines_at_turns_of_theirs():
+    """Planets of 40 teeth make 2.7 turns in one of the carrier; the sun makes 5, and has no places of its own."""
+    heard = heard_set(read_case(CASES / "planetary_27_40_108.toml"))
+    (places,) = heard.part_places(2.0, 0.02)
+    assert places == pytest.approx(np.arange(30) / 10)
+    assert heard.part_places(2.0, 0.03)[0] == pytest.approx(
+        [0.0, 0.3, 0.4, 0.6, 0.7, 1.0, 1.3, 1.4, 1.6, 1.7, 2.0, 2.3, 2.4, 2.6, 2.7]
+    )
+    assert heard.part_places(2.0, 0.06) == []
+    # a sun of 28 teeth makes 32/7 turns, and with four planets lines at multiples of 4/7
+    equal = HeardSet(100, 28, None, np.arange(4) * np.pi / 2)
+    assert equal.part_places(3.0, 0.02)[0] == pytest.approx(np.arange(7) * 4 / 7)
 
 
 def test_other_cases_are_refused():

@@ -8,7 +8,7 @@ from femgear.errors import CaseError
 from femgear.measured.channels import Channel
 from femgear.measured.lines import sharpened_lines
 from femgear.measured.spectra import windowed_spectrum
-from femgear.measured.turns import aligned_speed, constant_turns, resample_turns, turns_of_pulses
+from femgear.measured.turns import constant_turns, resample_turns, turns_of_pulses
 
 ORDER, VALUE = np.array(list(HEALTHY), float), np.array(list(HEALTHY.values()))
 SIGNAL, PULSES, TURNS = recording(ORDER, VALUE)
@@ -126,21 +126,6 @@ def test_a_pulse_a_turn_of_the_carrier_and_another_rate_suffice():
     strong = np.abs(VALUE) > 0.04
     assert np.abs(order - ORDER[strong]).max() < 0.01
     assert np.abs(20 * np.log10(height / np.abs(VALUE[strong]))).max() < 0.2
-
-
-def test_a_nominal_speed_is_aligned_with_the_lines():
-    signal, _, _ = recording(ORDER, VALUE, wander=0.0, carrier=3.0085)
-    speed = aligned_speed(channel(signal), 3.0, ORDER, 0.0035)
-    assert speed == pytest.approx(3.0085, rel=2e-5)
-    over_angle = resample_turns(channel(signal), constant_turns(channel(signal), speed))
-    order, height = sharpened_lines(windowed_spectrum(over_angle), -40.0)
-    assert np.abs(order - ORDER).max() < 0.01
-    assert np.abs(20 * np.log10(height / np.abs(VALUE))).max() < 0.2
-
-
-def test_a_range_within_which_other_lines_fit_is_refused():
-    with pytest.raises(CaseError, match="would fit as well"):
-        aligned_speed(channel(SIGNAL), 3.0, ORDER, 0.004)
 
 
 def test_records_that_do_not_fit_are_refused():
