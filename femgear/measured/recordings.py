@@ -174,13 +174,13 @@ def _carrier_speed(signal: Channel, recording: Recording, shafts: HeardSet) -> f
 
 
 def _tell_drift(signal: Channel, speed: float, orders: np.ndarray, further: np.ndarray, within: float) -> None:
-    """Say where the speeds of both halves of a recording smear its lines over more orders than a step of a half."""
+    """Say where the speeds of both halves of a recording smear its lines over more than a step of orders."""
     half = len(signal.values) // 2
     halves = [replace(signal, values=part) for part in (signal.values[:half], signal.values[half:])]
     within = min(within, widest_range(orders))
     first, second = (aligned_speed(part, speed, orders, within, further=further) for part in halves)
     smeared = abs(first - second) / speed * float(orders[-1])
-    if smeared > 2.0 / (signal.duration * speed):
+    if smeared > 1.0 / (signal.duration * speed):
         words = f"from the first half to the second the speed changes by {abs(second / first - 1):.2%}, and order "
         words += f"{orders[-1]} is smeared over {smeared:.2g} orders"
         remedy = "record pulses, or cut the record to a part of steady speed"

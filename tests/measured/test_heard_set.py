@@ -22,14 +22,12 @@ def test_the_reference_set():
 
 
 def test_faults_of_parts_have_lines_at_turns_of_theirs():
-    """Planets of 40 teeth make 2.7 turns in one of the carrier; the sun makes 5, and has no places of its own."""
+    """Planets of 40 teeth make 2.7 turns in one of the carrier; five of the sun beside multiples of three are whole."""
     heard = heard_set(read_case(CASES / "planetary_27_40_108.toml"))
-    (places,) = heard.part_places(2.0, 0.02)
-    assert places == pytest.approx(np.arange(30) / 10)
-    assert heard.part_places(2.0, 0.03)[0] == pytest.approx(
-        [0.0, 0.3, 0.4, 0.6, 0.7, 1.0, 1.3, 1.4, 1.6, 1.7, 2.0, 2.3, 2.4, 2.6, 2.7]
-    )
-    assert heard.part_places(2.0, 0.06) == []
+    of_sun, of_planet = heard.part_places(2.0, 0.02)
+    assert of_sun == pytest.approx([0, 1, 2])
+    assert of_planet == pytest.approx(np.arange(30) / 10)
+    assert len(heard.part_places(2.0, 0.05)) == 1
     # a sun of 28 teeth makes 32/7 turns, and with four planets lines at multiples of 4/7
     equal = HeardSet(100, 28, None, np.arange(4) * np.pi / 2)
     assert equal.part_places(3.0, 0.02)[0] == pytest.approx(np.arange(7) * 4 / 7)
