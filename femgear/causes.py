@@ -27,7 +27,7 @@ import numpy as np
 from femgear.case.dependencies import Steps
 from femgear.case.gear_set import planetary_set
 from femgear.errors import CaseError
-from femgear.housing.orders import FOREIGN, NORMAL, spacing_symmetry
+from femgear.housing.orders import FOREIGN, NORMAL, UNEQUAL, spacing_symmetry
 from femgear.measured.heard_set import HeardSet
 from femgear.measured.verdict import MeasuredVerdict
 from femgear.report.tables import Block
@@ -43,7 +43,6 @@ _COARSE = {"static.flank_elements": 8, "static.positions": 16, "static.stresses"
 _ONE = {"planet": 1}
 _OLD = ("set.pin_errors", "planet.individual", "carrier.errors", "sun.errors", "planet.errors", "ring.errors")
 _OLD += ("sun.fault", "planet.fault", "ring.fault")
-_WHOLE = 1e-9
 
 
 @dataclass(frozen=True)
@@ -84,6 +83,10 @@ _FAULT_WORDS = {
     "spall": "spall on a tooth of the {}",
     "missing": "missing tooth of the {}",
 }
+
+
+_ALIKE, _EXPLAINS = 0.02, 0.5
+"""Difference of likeness below which causes cannot be told apart, and likeness from which on that is said."""
 
 
 @dataclass(frozen=True)
@@ -147,8 +150,7 @@ def _ranked_faults(
 ) -> Iterator[RankedCause]:
     """Rank faults of teeth of the parts whose turns lines have."""
     gears, steps = planetary_set(case), Steps()
-    turning = {line.place.part for line in verdict.lines if line.place.part}
-    for gear, kind in product(sorted(turning & {"sun", "planet"}), _FAULT_SIZES):
+    for gear, kind in product(_heard_parts(verdict), _FAULT_SIZES):
         sizes = [share * gears.sun.module for share in _FAULT_SIZES[kind]]
         flank = carrying_flanks(gears, gear, back=case.torque_on_first_gear() < 0.0)[0]
         fitted = []
@@ -161,6 +163,20 @@ def _ranked_faults(
             cause = Cause(_FAULT_WORDS[kind].format(gear), f"{gear}.fault", lambda size: size, gear)
             fitted.append(_fitted(cause, made, abnormal, verdict.tolerance))
         yield _between_sizes(fitted, sizes)
+
+
+def _heard_parts(verdict: MeasuredVerdict) -> list[str]:
+    """Name sun and planet where lines have their turns, or may have: turns that are whole give whole orders."""
+    parts = {line.place.part for line in verdict.lines if line.place.part}
+    if any(line.verdict == UNEQUAL for line in verdict.lines):
+        parts |= {part for part in ("sun", "planet") if _turns_whole(verdict.gear_set, part)}
+    return sorted(parts)
+
+
+def _turns_whole(gears: HeardSet, part: str) -> bool:
+    """Whether a part makes whole turns in one of the carrier."""
+    teeth = gears.sun if part == "sun" else gears.planet
+    return teeth is not None and gears.ring % teeth == 0
 
 
 def _between_sizes(fitted: Sequence[RankedCause], sizes: Sequence[float]) -> RankedCause:
@@ -217,9 +233,7 @@ def _fits(cause: Cause, gears: HeardSet, abnormal: Mapping[float, float]) -> boo
     """Whether a cause can make any of the lines: errors of planets alone cost long computations."""
     if cause.turns != "planet" or gears.planet is None:
         return True
-    rate = gears.ring / gears.planet
-    off = [abs(order - round(order)) > 0.01 for order in abnormal]
-    return any(off) or abs(rate - round(rate)) < _WHOLE
+    return any(abs(order - round(order)) > 0.01 for order in abnormal) or _turns_whole(gears, "planet")
 
 
 def _derivative(
@@ -286,6 +300,9 @@ def describe_causes(ranked: tuple[RankedCause, ...]) -> Block:
         f"by lines of errors of {_STEP * 1e6:g} µm, coarsely computed, in proportion; likeness 1: heights spread alike",
         "faults of teeth by lines of two sizes: depth of a crack, length of a spall; a missing tooth has none",
     )
+    alike = [entry.cause.name for entry in ranked if ranked[0].explained - entry.explained < _ALIKE]
+    if len(alike) > 1 and ranked[0].explained >= _EXPLAINS:
+        notes += (f"cannot be told apart by this recording, but by their sizes: {'; '.join(alike)}",)
     header = ("cause", "entry", "size [µm]", "likeness", "its strongest orders")
     return Block("What would make the abnormal lines", header, tuple(_rows(ranked)), notes)
 

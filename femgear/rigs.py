@@ -9,15 +9,16 @@ from __future__ import annotations
 import os
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NoReturn
 
 import numpy as np
 
 from femgear.errors import CaseError
-from femgear.measured.heard_set import heard_set
-from femgear.measured.lines import sharpened_lines
+from femgear.measured.heard_set import HeardSet, heard_set
+from femgear.measured.lines import order_tolerance, sharpened_lines
 from femgear.measured.recordings import read_by_turns
 from femgear.measured.spectra import windowed_spectrum
+from femgear.measured.wrong_turns import lines_near_mesh
 from femgear.report.tables import Block
 from femgear.trains.drafts import ToothForm, new_case
 from femgear.trains.reading import parse_case
@@ -28,9 +29,13 @@ if TYPE_CHECKING:
 
 _THRESHOLD = -20.0
 """Level over the largest line of the bands from which on lines count [dB]."""
+_LINES_FROM = -30.0
+"""Level over the largest of all lines from which on they tell whether the recording is one of the rig [dB]."""
 _BESIDE, _APART = 6, 0.05
 """Carrier orders on either side of a mesh harmonic, and distance of orders that count as one."""
 _HARMONICS = 3
+_LEAST_WHOLE = 0.25
+"""Share of lines at whole orders below which the speed is another one: errors of pins and carrier make no others."""
 _IN_PHASE_SHARE = 0.5
 """Largest height of the line at the mesh order over the largest, of planets in phase."""
 
@@ -159,12 +164,15 @@ class RigCheck:
         Line at the mesh order over the largest one around it.
     largest : (int, int)
         Whole orders of the two largest lines around the first mesh harmonic.
+    whole : float
+        Of the lines near mesh harmonics, those at whole orders.
     """
 
     share: float
     lines: int
     at_mesh_order: float
     largest: tuple[int, ...]
+    whole: float
 
     def passed(self, rig: Rig) -> tuple[bool | None, bool | None]:
         """Tell whether the places of the lines, and their heights around the mesh order, are those of a rig.
@@ -208,7 +216,8 @@ def check_rig(rig: Rig, spectrum: OrderSpectrum) -> RigCheck:
     at_mesh = height[np.abs(order - ring) <= _APART].max(initial=0.0) / height.max(initial=1e-300)
     largest = tuple(round(at) for at in order[np.argsort(-height, kind="stable")[:2]].tolist())
     share = float(at_multiples.mean()) if len(places) else 0.0
-    return RigCheck(share, len(places), float(at_mesh), largest)
+    whole = float((np.abs(places - np.rint(places)) <= _APART).mean()) if len(places) else 0.0
+    return RigCheck(share, len(places), float(at_mesh), largest, whole)
 
 
 def describe_rig(rig: Rig) -> Block:
@@ -229,9 +238,12 @@ def describe_rig(rig: Rig) -> Block:
 def judge_rig(rig: Rig, path: str | os.PathLike, recording: Recording) -> Block:
     """Tabulate whether a recording of a healthy rig holds what it should, by the rule of `check_rig`.
 
-    CaseError: a recording that cannot be used, or one that ends below the mesh order (E-FILE, E-SPEED, E-RANGE).
+    CaseError: a recording that cannot be used, or one that ends below the mesh order (E-FILE, E-SPEED, E-RANGE); one
+    that cannot be judged, as no line stands out near a mesh harmonic, or lines have nothing to do with the rig at this
+    speed (E-FILE).
     """
-    spectrum = windowed_spectrum(read_by_turns(path, recording, heard_set(rig.case())))
+    gear_set = heard_set(rig.case())
+    spectrum = windowed_spectrum(read_by_turns(path, recording, gear_set))
     if spectrum.order[-1] < rig.teeth[2] + _BESIDE:
         raise CaseError(
             "the recording ends below the mesh order",
@@ -241,9 +253,40 @@ def judge_rig(rig: Rig, path: str | os.PathLike, recording: Recording) -> Block:
             limit=f"order {rig.teeth[2] + _BESIDE}",
             remedy="sample it faster, or record at a lower speed",
         )
+    _need_lines_of_rig(gear_set, spectrum, os.fsdecode(path))
     check = check_rig(rig, spectrum)
+    if not check.lines:
+        _refuse_to_judge("no line stands out near a mesh harmonic", os.fsdecode(path))
+    if check.whole < _LEAST_WHOLE:
+        words = f"of the lines near mesh harmonics {check.whole:.0%} lie at whole orders, at the speed that is taken"
+        _refuse_to_judge(words, os.fsdecode(path))
     title = f"{rig.name}: {os.path.basename(os.fsdecode(path))}"
     return Block(title, ("", "found", "allowed", ""), tuple(_rows(rig, check)))
+
+
+def _need_lines_of_rig(gear_set: HeardSet, spectrum: OrderSpectrum, file: str) -> None:
+    """Refuse a spectrum whose lines are none of the set at the speed that is taken (CaseError, E-FILE)."""
+    order, height = sharpened_lines(spectrum, _LINES_FROM)
+    if not len(order):
+        _refuse_to_judge("no line stands out of the noise", file)
+    tolerance = order_tolerance(spectrum.turns)
+    mesh = lines_near_mesh(gear_set, order, height, tolerance, float(spectrum.order[-1]))
+    if mesh.factor != 1.0:
+        words = f"lines lie at orders of the rig if the carrier made {mesh.factor:.4g} times as many turns"
+        _refuse_to_judge(words, file)
+    if not mesh.fits:
+        _refuse_to_judge("lines lie as they would without this rig, at the speed that is taken", file)
+
+
+def _refuse_to_judge(words: str, file: str) -> NoReturn:
+    """Refuse a recording by which nothing can be said of a rig (CaseError, E-FILE)."""
+    raise CaseError(
+        f"the recording cannot be judged: {words}",
+        code="E-FILE",
+        file=file,
+        limit="lines of the rig, 14 dB out of the noise around them",
+        remedy="check the speed, --pulses-of and --per-turn, the channel and that the recording is one of this rig",
+    )
 
 
 _WORDS = {True: "passed", False: "not passed", None: "no line to compare"}

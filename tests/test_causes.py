@@ -43,7 +43,7 @@ def known_lines(monkeypatch):
     monkeypatch.setattr(causes, "_heights", heights)
 
 
-def test_the_error_whose_lines_are_spread_so_comes_first_with_its_size(tmp_path, known_lines):
+def test_the_error_whose_lines_are_spread_so_comes_first_with_its_size(tmp_path, known_lines, known_faults):
     # ten times the lines of a micrometre of the pin; the recording is twice as loud, which drops out
     lines = HEALTHY | {215: 0.2, 217: 0.3, 110.13: 0.2}
     ranked = rank_causes(read_case(CASE), verdict_of(tmp_path, lines, [2 * height for height in lines.values()]))
@@ -53,7 +53,8 @@ def test_the_error_whose_lines_are_spread_so_comes_first_with_its_size(tmp_path,
     assert ranked[1].size == pytest.approx(20 * UM, rel=0.01) and ranked[2].size == pytest.approx(1000 * UM, rel=0.01)
     assert found["runout of the sun"].explained == 0.0 and np.isnan(found["runout of the sun"].size)
     assert "runout of one planet" not in found  # no line has its turns
-    rows = describe_causes(ranked).rows
+    rows, notes = describe_causes(ranked).rows, describe_causes(ranked).notes
+    assert "told apart by this recording, but by their sizes: a planet's pin, along its circle; thinner" in notes[-1]
     assert rows[0] == ("a planet's pin, along its circle", "set.pin_errors", "10", "1.00", "217, 215")
 
 
@@ -76,10 +77,13 @@ def known_faults(monkeypatch):
     """Lines of faults of a planet that are made up: a crack's grow with its square, and spread otherwise."""
 
     def heights(case, steps):
-        (fault,) = case.planet.fault
+        (fault,) = case.planet.fault or case.sun.fault
         size = 0.0 if fault.kind == "missing" else (fault.depth if fault.kind == "crack" else fault.length) / 1.5e-3
         height = {"crack": 0.1 * size**2, "spall": 0.001 * size, "missing": 5.0}[fault.kind]
         spread = {326.7: 2.0, 321.3: 1.0} if fault.kind == "crack" else {326.7: 0.5, 321.3: 2.0}
+        if case.sun.fault:
+            height = {"crack": 0.01 * size**2, "spall": 0.001 * size, "missing": 0.1}[fault.kind]
+            spread = {214.0: 2.0, 220.0: 1.0} if fault.kind == "missing" else {218.0: 2.0, 220.0: 1.0}
         healthy = {float(order): complex(value) for order, value in HEALTHY.items()}
         return healthy | {order: height * share for order, share in spread.items()}
 
@@ -114,6 +118,18 @@ def test_faults_of_the_part_whose_turns_are_heard_are_tried(tmp_path, known_line
     assert not any(name.endswith("the sun") and "tooth" in name for name in likeness)
 
 
+def test_faults_of_a_sun_of_whole_turns_are_tried_on_whole_orders(tmp_path, known_lines, known_faults):
+    """A sun of 27 teeth in a ring of 108 makes five turns in one of the carrier: no line shows its turns alone."""
+    lines = HEALTHY | {214: 0.2, 220: 0.1}
+    ranked = rank_causes(read_case(CASE), verdict_of(tmp_path, lines, lines.values()))
+    assert ranked[0].cause.name == "missing tooth of the sun"
+    assert ranked[0].explained == pytest.approx(1.0, abs=0.02)
+    likeness = {entry.cause.name: entry.explained for entry in ranked}
+    assert max(likeness.pop("spall on a tooth of the sun"), likeness.pop("crack in a tooth of the sun")) < 0.3
+    assert likeness["a planet's pin, along its circle"] == 0.0
+    assert not any(name.endswith("the planet") for name in likeness)
+
+
 @pytest.mark.slow
 def test_a_crack_that_made_a_recording_is_found_with_its_depth(tmp_path, monkeypatch):
     """In another planet, tooth and grid than those with which causes are computed; of these the crack alone."""
@@ -127,9 +143,12 @@ def test_a_crack_that_made_a_recording_is_found_with_its_depth(tmp_path, monkeyp
     columns = np.arange(len(signal)) / RATE, signal, pulses
     path = write_columns(tmp_path / "a.csv", "time [s];acc [m/s^2];tacho [V]\n", columns)
     verdict = measured_verdict(read_case(CASE), path, Recording(pulses="tacho"), LineSearch(threshold=-50.0))
-    (ranked,) = rank_causes(read_case(CASE), verdict)
+    ranked, of_sun = rank_causes(read_case(CASE), verdict)
+    assert ranked.cause.entry == "planet.fault"
     assert ranked.size == pytest.approx(1e-3, rel=0.05)
     assert ranked.explained > 0.98
+    assert of_sun.cause.entry == "sun.fault"
+    assert of_sun.explained < 0.2
 
 
 @pytest.mark.slow

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from recorded_signals import RATE, recording, write_columns
+from scipy.io import wavfile
 
 from femgear import cli, solve
 from femgear.errors import CaseError
@@ -65,6 +66,45 @@ def test_the_command_lists_writes_and_judges(tmp_path, capsys):
     assert cli.main(["rigs", "none"]) == 2 and "E-CHOICE" in capsys.readouterr().err
     with pytest.raises(CaseError, match="no such rig"):
         find_rig("none")
+
+
+def written(folder, rig, lines, *, noise=1e-3):
+    """Record lines at the speed of the sun for which they are predicted: the file and that speed [rpm]."""
+    rpm, (sun, _, ring) = float(rig.speed.split()[0]), rig.teeth
+    carrier = rpm / 60 * sun / (sun + ring)
+    rate = float(round(12.0 * ring * carrier))
+    heights = np.array([*lines.values()]) if lines else np.zeros(1)
+    options = {"carrier": carrier, "wander": 0.0, "seconds": 30 / carrier, "rate": rate, "noise": noise}
+    signal, _, _ = recording([*lines] or [1.0], heights, **options)
+    signal += 1e-3 * (not lines) * np.random.default_rng(1).normal(size=len(signal))
+    wavfile.write(folder / "a.wav", round(rate), signal.astype(np.float32))
+    return str(folder / "a.wav"), rpm
+
+
+@pytest.mark.parametrize("rig", RIGS.values(), ids=RIGS)
+def test_recordings_by_which_nothing_can_be_said_are_refused(rig, tmp_path, capsys, recwarn):
+    """Noise, another speed, another set; a healthy rig passes, and one with unequal pins does not."""
+
+    def judged(lines, factor=1.0):
+        file, rpm = written(tmp_path, rig, lines)
+        code = cli.main(["rigs", rig.name, file, "--speed", f"{factor * rpm} rpm"])
+        printed = capsys.readouterr()
+        return code, printed.out + printed.err
+
+    healthy = {order: height for order, height in rig.predicted.items() if height}
+    healthy |= {order + rig.teeth[2] - rig.teeth[2] % rig.planets: height for order, height in healthy.items()}
+    code, printed = judged(healthy)
+    assert (code, printed.count(" passed"), printed.count("not passed")) == (0, 2, 0)
+    between = [at for at in range(rig.teeth[2] - 4, rig.teeth[2] + 5) if at % rig.planets and at != rig.teeth[2]]
+    code, printed = judged(healthy | dict.fromkeys(between, 0.2))
+    assert code == 0
+    assert "not passed" in printed
+    others = {0.83 * order: height for order, height in healthy.items()}
+    for lines, factor in (({}, 1.0), (healthy, 1.004), (healthy, 2.0), (others, 1.0)):
+        code, printed = judged(lines, factor)
+        assert code == 2
+        assert "[E-FILE]" in printed
+        assert "cannot be judged" in printed
 
 
 @pytest.mark.slow

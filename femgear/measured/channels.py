@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
@@ -14,6 +15,8 @@ LEAST_SAMPLES = 64
 """Samples below which a channel is no signal."""
 MOST_BYTES = 4_000_000_000
 """Size of a file that is read [bytes]."""
+_WHOLE_SAMPLE = 1e-6
+"""Part of a sample by which a time may miss it."""
 _UNEVEN = 0.5
 """Distance of a time from its place on an even scale, in steps, from which a scale is uneven."""
 _TIME_NAMES = ("time", "t", "zeit", "temps", "tiempo", "tempo", "x_value", "seconds", "sec")
@@ -137,12 +140,35 @@ def checked_channel(channel: Channel) -> Channel:
     lost = np.flatnonzero(~np.isfinite(values))
     if len(lost):
         message = f"sample {lost[0] + 1} is no finite number, and {len(lost) - 1} others"
-        remedy = "cut the record where samples are missing; nothing is put in their place"
+        remedy = "leave that part out by --begin or --end; nothing is put in the place of missing samples"
         raise channel.problem(message, value=values[lost[0]], remedy=remedy)
     if np.ptp(values) == 0.0:
         message, remedy = "the channel is empty: all samples are equal", "name the channel of the sensor by --channel"
         raise channel.problem(message, value=values[0], remedy=remedy)
     return replace(channel, values=values)
+
+
+def cut_channel(channel: Channel, begin: float | None, end: float | None) -> Channel:
+    """Take the samples of a channel from one time up to another [s]; None is where it begins or ends.
+
+    CaseError: no samples between them (E-RANGE).
+    """
+    if begin is None and end is None:
+        return channel
+    first = 0 if begin is None else max(math.ceil((begin - channel.start) * channel.rate - _WHOLE_SAMPLE), 0)
+    after = len(channel.values) if end is None else math.ceil((end - channel.start) * channel.rate - _WHOLE_SAMPLE)
+    values = channel.values[first : max(after, 0)]
+    if not len(values):
+        last = channel.start + channel.duration
+        raise CaseError(
+            f"no samples of channel {channel.name} between two times",
+            code="E-RANGE",
+            key="--end" if begin is None else "--begin",
+            file=channel.file,
+            value=f"{channel.start if begin is None else begin:g} to {last if end is None else end:g} s",
+            limit=f"ascending, within {channel.start:g} to {last:g} s",
+        )
+    return replace(channel, values=values, start=channel.start + first / channel.rate)
 
 
 def choose_channel(channels: Iterable[Channel], name: str | None, option: str = "--channel") -> Channel:

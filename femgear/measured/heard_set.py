@@ -54,7 +54,7 @@ class HeardSet:
         return np.concatenate([orders, orders[orders % spacing_symmetry(self.angles) == 0]])
 
     def part_places(self, highest: float, tolerance: float) -> list[np.ndarray]:
-        """Find orders up to a highest at which a fault of the sun, and of one planet, has lines: arrays, ascending.
+        """Find orders (m,) up to a highest at which a fault of the sun has lines, and those of one planet, ascending.
 
         Those closer than four times the tolerance of orders are left out, as most lines would be among them.
         """

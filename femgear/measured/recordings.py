@@ -13,7 +13,7 @@ from femgear.case.quantities import SPEED, to_si
 from femgear.errors import CaseError
 from femgear.findings import Finding, tell
 from femgear.measured.aligned_speed import aligned_speed, widest_range
-from femgear.measured.channels import Channel, choose_channel
+from femgear.measured.channels import Channel, choose_channel, cut_channel
 from femgear.measured.csv_signals import read_csv_signals
 from femgear.measured.heard_set import HeardSet
 from femgear.measured.requests import Recording
@@ -54,6 +54,12 @@ def read_channels(path: str | os.PathLike, *, rate: float | None = None) -> tupl
     return reader(path, rate=rate)
 
 
+def read_recording(path: str | os.PathLike, recording: Recording) -> tuple[Channel, ...]:
+    """Read all channels of a recording between the times of a request; CaseError as `read_channels`, and E-RANGE."""
+    channels = read_channels(path, rate=recording.rate)
+    return tuple(cut_channel(channel, recording.begin, recording.end) for channel in channels)
+
+
 def read_by_turns(path: str | os.PathLike, recording: Recording, shafts: HeardSet) -> AngleSignal:
     """Read a signal and sample it anew over the angle of the carrier.
 
@@ -72,7 +78,7 @@ def read_by_turns(path: str | os.PathLike, recording: Recording, shafts: HeardSe
         What `read_channels`, `turns_of_pulses` and `resample_turns` refuse (E-FILE); neither pulses nor a speed,
         or both, a member that stands still (E-SPEED).
     """
-    channels = read_channels(path, rate=recording.rate)
+    channels = read_recording(path, recording)
     turns, others = None, list(channels)
     if recording.pulses is not None:
         turns, others = _pulses(channels, recording, shafts)
@@ -183,5 +189,5 @@ def _tell_drift(signal: Channel, speed: float, orders: np.ndarray, further: np.n
     if smeared > 1.0 / (signal.duration * speed):
         words = f"from the first half to the second the speed changes by {abs(second / first - 1):.2%}, and order "
         words += f"{orders[-1]} is smeared over {smeared:.2g} orders"
-        remedy = "record pulses, or cut the record to a part of steady speed"
+        remedy = "record pulses, or take a part of steady speed by --begin and --end"
         tell(Finding("W-UNSTEADY", "--speed", words, remedy=remedy))

@@ -30,6 +30,8 @@ class Recording:
         Acceleration that a one in the file stands for, as "1 g" or "98.1 m/s^2". Default: the unit that the file names.
     within
         Share of that speed within which the one is searched at which the lines stand best on orders of the set.
+    begin, end
+        Times of the file between which samples are taken [s]. Default: all.
     """
 
     channel: str | None = None
@@ -40,6 +42,8 @@ class Recording:
     speed: str | None = None
     within: float | None = None
     unit: str | None = None
+    begin: float | None = None
+    end: float | None = None
 
 
 @dataclass(frozen=True)

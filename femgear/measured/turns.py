@@ -158,7 +158,7 @@ def _refuse_wrong_pulses(channel: Channel, time: np.ndarray) -> None:
             f"and {len(wrong) - 1} other intervals are wrong",
             value=f"{ratio[wrong[0]]:.3g} times the interval of the neighbours",
             limit=f"{_SHORT:g} to {_LONG:g} times",
-            remedy="cut the record there, or mend the channel; the angle is not guessed",
+            remedy="leave that part out by --begin or --end, or mend the channel; the angle is not guessed",
         )
     if len(time) < _FEWEST_SMOOTHED:
         return
@@ -170,7 +170,7 @@ def _refuse_wrong_pulses(channel: Channel, time: np.ndarray) -> None:
             f"a pulse is {'late' if share > 0 else 'early'} at {time[most + 2]:.6g} s",
             value=f"{abs(share):.2g} of an interval off the curve of the pulses beside it",
             limit=f"{_AWAY:g}, or {_OUTLYING:g} times what most pulses are",
-            remedy="cut the record there, or mend the channel; the angle is not guessed",
+            remedy="leave that part out by --begin or --end, or mend the channel; the angle is not guessed",
         )
 
 
@@ -235,7 +235,7 @@ def resample_turns(channel: Channel, turns: Turns, *, parts: int = 1) -> AngleSi
         raise channel.problem(message, limit=f"{LEAST_TURNS} or more", remedy=remedy)
     if covered < 0.5:
         message, value = "pulses cover a part of the signal alone", f"{covered:.0%} of {channel.duration:.4g} s"
-        remedy = "check the rate of either channel, or cut the signal to the time of the pulses"
+        remedy = "check the rate of either channel, or take the time of the pulses alone by --begin and --end"
         raise channel.problem(message, value=value, limit="50 % or more", remedy=remedy)
     slowest, fastest = kept.speeds
     per_turn = parts * int(np.ceil(channel.rate / (slowest * parts)))
@@ -246,11 +246,14 @@ def resample_turns(channel: Channel, turns: Turns, *, parts: int = 1) -> AngleSi
             file=channel.file,
             value=f"{slowest * 60:.4g} to {fastest * 60:.4g} rpm: {whole * per_turn:.3g} samples",
             limit=f"{_MOST_SAMPLES:.3g} samples",
-            remedy="cut the record to a part of its speeds",
+            remedy="take a part of its speeds by --begin and --end",
         )
     times = kept.times(kept.turns[0] + np.arange(whole * per_turn) / per_turn)
     if not np.all(np.diff(times) > 0):
-        message, remedy = "the angle between pulses does not grow", "use more pulses a turn, or cut the record"
+        message, remedy = (
+            "the angle between pulses does not grow",
+            "use more pulses a turn, or a part of the record by --begin and --end",
+        )
         raise channel.problem(message, value=f"{slowest * 60:.4g} to {fastest * 60:.4g} rpm", remedy=remedy)
     values = map_coordinates(channel.values, [(times - channel.start) * channel.rate], order=5, mode="mirror")
     highest, mean = _HIGHEST * channel.rate / fastest, whole / (times[-1] - times[0])

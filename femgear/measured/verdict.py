@@ -26,7 +26,7 @@ from femgear.measured.lines import (
     order_tolerance,
     sharpened_lines,
 )
-from femgear.measured.recordings import channel_in_si, read_by_turns, read_channels
+from femgear.measured.recordings import channel_in_si, read_by_turns, read_recording
 from femgear.measured.requests import FurtherFiles, LineSearch, Recording
 from femgear.measured.spectra import frequency_response, power_density, windowed_spectrum
 from femgear.measured.turns import AngleSignal
@@ -156,7 +156,7 @@ def _further_tables(
         yield f"average_{name.replace(' ', '_')}.csv", ((axis, f"average [{unit}]"), columns)
     if not further.density and further.force is None:
         return
-    channels = read_channels(path, rate=recording.rate)
+    channels = read_recording(path, recording)
     channel = channel_in_si(choose_channel(channels, recording.channel or signal.name), recording.unit)
     if further.density:
         yield "density.csv", (("frequency [Hz]", f"density [({unit})^2/Hz]"), power_density(channel))

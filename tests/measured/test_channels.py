@@ -4,7 +4,15 @@ import numpy as np
 import pytest
 
 from femgear.errors import CaseError
-from femgear.measured.channels import Channel, agreed_rate, checked_channel, choose_channel, rate_of_times, split_unit
+from femgear.measured.channels import (
+    Channel,
+    agreed_rate,
+    checked_channel,
+    choose_channel,
+    cut_channel,
+    rate_of_times,
+    split_unit,
+)
 
 
 def channel(values, name="a", rate=1000.0):
@@ -84,3 +92,28 @@ def test_a_channel_is_chosen_by_name_or_number():
         with pytest.raises(CaseError, match=words) as refused:
             choose_channel(channels, name)
         assert "1 x; 2 y" in str(refused.value)
+
+
+@pytest.mark.parametrize(
+    ("begin", "end", "samples"),
+    [
+        (None, None, (0, 200)),
+        (10.05, None, (50, 200)),
+        (None, 10.1, (0, 100)),
+        (10.05, 10.0505, (50, 51)),
+        (1, 99, (0, 200)),
+    ],
+)
+def test_a_part_of_a_channel_keeps_its_times(begin, end, samples):
+    whole = Channel("file.csv", "a", "V", 1000.0, SINE, 10.0)
+    part = cut_channel(whole, begin, end)
+    assert np.array_equal(part.values, SINE[slice(*samples)])
+    assert part.time == pytest.approx(whole.time[slice(*samples)])
+
+
+@pytest.mark.parametrize(("begin", "end"), [(10.3, None), (None, 10.0), (10.1, 10.1), (10.1, 10.05)])
+def test_a_part_without_samples_is_refused(begin, end):
+    with pytest.raises(CaseError, match="no samples of channel a between two times") as refused:
+        cut_channel(Channel("file.csv", "a", "V", 1000.0, SINE, 10.0), begin, end)
+    assert refused.value.code == "E-RANGE"
+    assert "10 to 10.2 s" in str(refused.value)

@@ -69,6 +69,23 @@ def test_a_constant_speed_that_is_none_is_told(speed, within, wander, words, tmp
         assert over_angle.speed == pytest.approx(speed if within else 3.0, rel=1e-3)
 
 
+def test_a_start_from_rest_is_left_out_as_the_refusal_says(tmp_path):
+    """At rest up to 2 s, then faster and faster up to 4 s."""
+    time = np.arange(int(10 * RATE)) / RATE
+    turns = 3.0 * np.cumsum(np.clip(0.5 * (time - 2.0), 0.0, 1.0)) / RATE
+    signal = sum(height * np.cos(2 * np.pi * order * turns) for order, height in HEALTHY.items())
+    signal = np.real(signal) + 1e-3 * np.random.default_rng(4).normal(size=len(time))
+    path = write_recording(tmp_path, "wav", signal, 5.0 * (np.mod(5.0 * turns, 1.0) < 0.1) * (turns > 0), RATE)
+    with pytest.raises(CaseError, match="--begin or --end") as refused:
+        read_by_turns(path, Recording(channel="1", pulses="2"), HEARD)
+    assert refused.value.code == "E-FILE"
+    over_angle = read_by_turns(path, Recording(channel="1", pulses="2", begin=4.0, end=9.0), HEARD)
+    assert over_angle.speed == pytest.approx(3.0, rel=1e-3)
+    order, height = sharpened_lines(windowed_spectrum(over_angle), -19.0)
+    assert order == pytest.approx([3, 213, 219, 321, 327], abs=0.02)
+    assert height == pytest.approx([abs(HEALTHY[round(at)]) for at in order], rel=0.05)
+
+
 @pytest.mark.parametrize("within", [None, 0.003])
 @pytest.mark.parametrize("nominal", [900.0, 899.0])
 def test_loud_lines_of_a_fault_do_not_shift_a_speed(nominal, within, tmp_path, recwarn):
