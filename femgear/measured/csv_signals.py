@@ -29,6 +29,8 @@ from femgear.measured.channels import (
 
 _HEAD = 1_000_000
 """Bytes within which the first number must stand."""
+_MOSTLY = 0.9
+"""Share of high bytes that are zero in UTF-16 of numbers."""
 _LOOKED_AT = 50
 """Lines by which separator and decimal mark are found."""
 _SEPARATORS = (";", "\t", ",", None)
@@ -76,9 +78,14 @@ def read_csv_signals(path: str | os.PathLike, *, rate: float | None = None) -> t
 
 
 def _decoded(data: bytes, name: str) -> str:
-    """Text of a file in UTF-8, UTF-16 with its mark, or Latin-1, in which programs of measurement write."""
+    """Text of a file in UTF-8, UTF-16 with its mark or without, or Latin-1, in which programs of measurement write."""
     if data[:2] in (b"\xff\xfe", b"\xfe\xff"):
         return data.decode("utf-16", "replace")
+    for high, encoding in ((1, "utf-16-le"), (0, "utf-16-be")):
+        # of numbers and names in columns nearly all high bytes are zero, and no low ones
+        zeros = data[high:_HEAD:2].count(0)
+        if zeros > _MOSTLY * len(data[high:_HEAD:2]) and b"\0" not in data[1 - high : _HEAD : 2]:
+            return data.decode(encoding, "replace")
     if b"\0" in data[:_HEAD]:
         remedy = "name a text file, or keep the end of the name: .wav, .mat, .uff, .unv"
         raise file_problem(name, "bytes that no text has", remedy=remedy)

@@ -42,17 +42,17 @@ def read_wav_signals(path: str | os.PathLike, *, rate: float | None = None) -> t
     name = printable(Path(path).name)
     data = read_bytes(path, MOST_BYTES, "name a WAV file")
     remedy = "copy the file again, or export it as WAV of integers or floats"
+    promised = int.from_bytes(data[4:8], "little") + 8 if data[:4] == b"RIFF" else len(data)
+    if len(data) < promised < 0xFFFFFFF0:
+        raise file_problem(
+            name, "the file is broken off", value=f"{len(data)} bytes", limit=f"{promised}", remedy=remedy
+        )
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", wavfile.WavFileWarning)  # chunks of other programs
             in_file, samples = wavfile.read(os.fspath(path))
     except Exception as error:  # of many kinds, where a file is damaged
         raise file_problem(name, f"no WAV file that can be read: {str(error)[:120]}", remedy=remedy) from error
-    promised = int.from_bytes(data[4:8], "little") + 8 if data[:4] == b"RIFF" else len(data)
-    if len(data) < promised < 0xFFFFFFF0:
-        raise file_problem(
-            name, "the file is broken off", value=f"{len(data)} bytes", limit=f"{promised}", remedy=remedy
-        )
     samples = samples.reshape(len(samples), -1)
     unit, scale = "", 1.0
     if samples.dtype.kind in "iu":

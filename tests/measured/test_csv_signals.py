@@ -45,7 +45,7 @@ def test_headings(heading, names, tmp_path):
     assert found == names and np.array_equal(values, VALUES) and rate == pytest.approx(1000.0)
 
 
-@pytest.mark.parametrize("encoding", ["latin-1", "utf-16", "utf-8-sig"])
+@pytest.mark.parametrize("encoding", ["latin-1", "utf-16", "utf-16-le", "utf-16-be", "utf-8-sig"])
 def test_encodings_of_programs(encoding, tmp_path):
     text = write_columns(tmp_path / "a.csv", "Zeit [s];Beschl. [m/s²]\n", (TIME, VALUES[0]), comma=True).read_text()
     (tmp_path / "a.csv").write_bytes(text.replace("\n", "\r\n").encode(encoding))

@@ -1,5 +1,8 @@
 """femgear.measured.sampled_files: WAV and MATLAB files of SciPy, h5py and femgear come back."""
 
+import struct
+import wave
+
 import h5py
 import numpy as np
 import pytest
@@ -89,6 +92,32 @@ def test_wav_files_that_are_broken_off_are_refused(length, tmp_path):
     with pytest.raises(CaseError, match=r"broken off|no WAV file") as refused:
         read_wav_signals(tmp_path / "a.wav")
     assert refused.value.code == "E-FILE" and refused.value.remedy
+
+
+@pytest.mark.parametrize(("bits", "channels"), [(16, 1), (24, 1), (24, 2), (32, 2)])
+def test_wav_files_that_end_within_a_sample_are_called_broken_off(bits, channels, tmp_path):
+    with wave.open(str(tmp_path / "a.wav"), "wb") as stream:
+        stream.setparams((channels, bits // 8, 25600, 0, "NONE", ""))
+        stream.writeframes(bytes(bits // 8 * channels * 500))
+    data = (tmp_path / "a.wav").read_bytes()
+    for lost in range(1, 9):
+        (tmp_path / "a.wav").write_bytes(data[:-lost])
+        with pytest.raises(CaseError, match="the file is broken off"):
+            read_wav_signals(tmp_path / "a.wav")
+
+
+@pytest.mark.parametrize("extensible", [False, True])
+def test_wav_files_of_24_bits_come_back(extensible, tmp_path):
+    """The format WAVE_FORMAT_EXTENSIBLE names PCM by its GUID, as recorders of 24 bits do."""
+    samples = np.round(0.8 * VALUES[:, 0] / np.abs(VALUES[:, 0]).max() * 2**23).astype("<i4")
+    data = samples.view(np.uint8).reshape(-1, 4)[:, :3].tobytes()
+    head = struct.pack("<HHIIHH", 0xFFFE if extensible else 1, 1, 25600, 3 * 25600, 3, 24)
+    head += struct.pack("<HHI", 22, 24, 4) + bytes.fromhex("0100000000001000800000aa00389b71") if extensible else b""
+    body = b"WAVEfmt " + struct.pack("<I", len(head)) + head + b"data" + struct.pack("<I", len(data)) + data
+    (tmp_path / "a.wav").write_bytes(b"RIFF" + struct.pack("<I", len(body)) + body)
+    (channel,) = read_wav_signals(tmp_path / "a.wav")
+    assert channel.rate == 25600.0
+    assert channel.values == pytest.approx(samples / 2**23, abs=1e-12)
 
 
 def test_a_rate_that_contradicts_the_file(tmp_path):

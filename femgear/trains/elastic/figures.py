@@ -253,6 +253,7 @@ def draw_order_spectrum(housing: xr.Dataset, measured: Sequence[MeasuredSection]
     order, linear, exact = spectrum.order, spectrum.amplitude, np.zeros(len(spectrum.order))
     exact[np.searchsorted(order, only.order)] = only.amplitude
     bands = _strongest_bands(housing)
+    marks = np.array([pair for entry in measured for pair in zip(entry.orders, entry.accelerations)]).reshape(-1, 2)
     figure, axes = new_figure(rows=1 + len(bands), height=2.6 + 2.7 * len(bands))
     largest = max(linear.max(initial=0.0), exact.max(initial=0.0)) or 1.0
     floor = 1e-4 * largest
@@ -269,7 +270,7 @@ def draw_order_spectrum(housing: xr.Dataset, measured: Sequence[MeasuredSection]
     mark_mesh_harmonics(axes[0], hertz * ring_teeth)
     label(axes[0], "frequency [kHz]")
     for ax, harmonic in zip(axes[1:], bands):
-        _draw_band(ax, order, linear, exact, ring_teeth, harmonic, form)
+        _draw_band(ax, order, linear, exact, ring_teeth, harmonic, form, marks)
     for ax, per_order in zip(axes, [hertz, *(1.0 for _ in bands)]):
         label(ax, y=_ACCELERATION)
         _draw_measured(ax, measured, per_order)
@@ -294,8 +295,11 @@ def _draw_measured(ax, measured: Sequence[MeasuredSection], per_order: float) ->
     ax.set_ylim(floor, top)
 
 
-def _draw_band(ax, order, linear, exact, ring_teeth, harmonic, form):
-    """Draw the lines around a mesh harmonic, the strongest with their order and the distance from it."""
+def _draw_band(ax, order, linear, exact, ring_teeth, harmonic, form, marks):
+    """Draw the lines around a mesh harmonic, the strongest with their order and the distance from it.
+
+    These labels stand above ``marks`` (m, 2), orders and heights of measured lines, in their column.
+    """
     centre = harmonic * ring_teeth
     in_band = np.rint(order / ring_teeth) == harmonic
     largest = max(linear[in_band].max(initial=0.0), exact[in_band].max(initial=0.0)) or 1.0
@@ -309,13 +313,17 @@ def _draw_band(ax, order, linear, exact, ring_teeth, harmonic, form):
         shown = inside & (exact > floor)
         ax.plot(order[shown], exact[shown], "o", markerfacecolor="none", color=VERMILION, label=_EXACT)
     peak = np.maximum(linear, exact)
-    for k in _labelled(order, peak, inside & (peak > floor), spacing=0.025 * len(str(centre)) * reach):
+    spacing = 0.025 * len(str(centre)) * reach
+    marks = marks[np.abs(marks[:, 0] - centre) <= reach]
+    for k in _labelled(order, peak, inside & (peak > floor), spacing=spacing):
         beside = order[k] - centre
         text = f"{order[k]:.6g}" + (f"\n{'+' if beside > 0 else '−'}{abs(beside):.4g}" if beside else "")
         style = {"xytext": (0, 4), "textcoords": "offset points", "ha": "center", "va": "bottom"}
-        ax.annotate(text, (order[k], peak[k]), fontsize=SMALL, linespacing=1.0, **style)
+        top = marks[np.abs(marks[:, 0] - order[k]) <= 0.5 * spacing, 1].max(initial=peak[k])
+        ax.annotate(text, (order[k], top), fontsize=SMALL, linespacing=1.0, **style)
     # room above the strongest line for its label on the logarithmic axis
-    ax.set_ylim(floor, largest * (largest / floor) ** _ROOM)
+    top = marks[:, 1].max(initial=largest)
+    ax.set_ylim(floor, top * (top / floor) ** _ROOM)
     ax.minorticks_off()
     ax.set_xlim(centre - reach, centre + reach)
     strongest = int(np.argmax(np.where(in_band, peak, -1.0)))

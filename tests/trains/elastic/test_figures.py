@@ -73,6 +73,30 @@ def test_measured_lines_stand_over_the_computed_ones():
     assert len(drawn[2][0].get_xdata()) == 0 and figure.axes[1].get_ylim()[1] > 40.0
 
 
+@pytest.mark.parametrize("count", [5, 100])
+def test_orders_of_lines_stand_above_measured_ones_and_inside_the_frame(count):
+    """Whether few or many are measured, none of their marks lies on the name of a line."""
+    sides = {side: 10 ** (-abs(side) / 10) for side in (-9, -6, -3, 0, 3, 6, 9)}
+    lines = {TEETH * harmonic + side: height for harmonic in (1, 3) for side, height in sides.items()}
+    draws = np.random.default_rng(count)
+    orders = np.concatenate([[*lines][:count], draws.uniform(TEETH - 9, 3 * TEETH + 9, max(count - len(lines), 0))])
+    heights = np.array([lines.get(round(order), 0.1) for order in orders]) * draws.uniform(1.0, 3.0, len(orders))
+    entry = SimpleNamespace(source="rig", orders=tuple(orders.tolist()), accelerations=tuple(heights.tolist()))
+    figure = elastic_figures.draw_order_spectrum(heard(lines), [entry])
+    figure.canvas.draw()
+    named = 0
+    for ax in figure.axes[1:3]:
+        frame = ax.get_window_extent()
+        (marks,) = (line for line in ax.get_lines() if line.get_label() == "measured: rig")
+        pixels = ax.transData.transform(marks.get_xydata())
+        for text in ax.texts:
+            named += 1
+            box = text.get_window_extent()
+            assert box.y1 < frame.y1
+            assert not any(box.contains(*place) for place in pixels)
+    assert named == 14
+
+
 @pytest.mark.parametrize("turn", [1.0, -1.0])
 @pytest.mark.parametrize("start", [0.0, 0.7])
 def test_a_planet_that_is_heard_as_it_passes_stands_on_its_arm(turn, start):
