@@ -26,6 +26,8 @@ from femgear.storage.results import coordinates
 from femgear.trains.reading import read_case, with_value, with_values
 from validation.reference.plane_elasticity import edge_load
 
+pytestmark = pytest.mark.usefixtures("coarse_states")
+
 CASE = Path(__file__).parents[1] / "cases" / "planetary_27_40_108.toml"
 TEXT = CASE.read_text(encoding="utf-8")
 

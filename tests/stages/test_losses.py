@@ -16,6 +16,8 @@ from femgear.trains.reading import open_results, read_case, with_values
 from femgear.trains.registry import stages_of, train_of
 from validation.losses import computed_case, computed_loads
 
+pytestmark = pytest.mark.usefixtures("coarse_states")
+
 COARSE = {"static.positions": 16, "static.flank_elements": 6, "static.stresses": False}
 CONSTANT = {"losses": {"friction": "constant", "coefficient": 0.05}}
 

@@ -18,7 +18,7 @@ from femgear.study.objectives import named_quantity
 from femgear.trains.live import Answer
 from femgear.trains.reading import read_case, with_values
 
-pytestmark = pytest.mark.usefixtures("pictures_undrawn")
+pytestmark = pytest.mark.usefixtures("pictures_undrawn", "coarse_states")
 
 TOLERANCES = """
 [[tolerance]]

@@ -10,6 +10,8 @@ from femgear.housing.two_way.structure import supported_ring
 from femgear.solvers.linear.modal import modal_damping, undamped_modes
 from validation.fixed_housing import EQUAL, FEET, excitation, gears, joined, thin_ring
 
+pytestmark = pytest.mark.usefixtures("coarse_states")
+
 
 def solved(symmetry):
     """A set on four feet at two speeds, with the damping of gears and ring together."""

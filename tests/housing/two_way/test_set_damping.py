@@ -12,6 +12,8 @@ from femgear.solvers.linear.modal import modal_damping, undamped_modes
 from validation.fixed_housing import EQUAL, FEET, excitation, gears, joined, thin_ring
 from validation.reference.two_way_direct import direct_damped_forces, farthest_apart
 
+pytestmark = pytest.mark.usefixtures("coarse_states")
+
 RING = thin_ring(4, foundation=2e10)
 STRUCTURE = supported_ring(RING, FEET, max_diameter=4, max_frequency=1e6, damping_ratio=0.04, sensor_angles=(0.3, 2.0))
 

@@ -8,6 +8,8 @@ import pytest
 from femgear.run import solve
 from femgear.trains.reading import read_case, with_values
 
+pytestmark = pytest.mark.usefixtures("coarse_states")
+
 CASES = Path(__file__).parents[3] / "cases"
 FEW = {
     "static.positions": 16,

@@ -37,7 +37,7 @@ from femgear.trains.gearbox.stages import describe_gearbox, solve_box_modes, sol
 from femgear.trains.reading import read_case
 from femgear.trains.registry import check_case
 
-pytestmark = pytest.mark.usefixtures("pictures_undrawn")
+pytestmark = pytest.mark.usefixtures("pictures_undrawn", "coarse_states")
 
 LARGEST = 1e-9
 # beyond what counts as rigid

@@ -8,6 +8,8 @@ from femgear.trains.gearbox.figures import deflected_shafts, gearbox_campbell, l
 from femgear.trains.gearbox.stages import solve_box_modes, solve_deflections
 from femgear.trains.reading import read_case
 
+pytestmark = pytest.mark.usefixtures("coarse_states")
+
 
 @pytest.fixture(scope="module")
 def data():

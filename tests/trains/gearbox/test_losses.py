@@ -29,6 +29,8 @@ from femgear.trains.gearbox.losses import (
 from femgear.trains.gearbox.results import DeflectionResult
 from femgear.trains.reading import read_case
 
+pytestmark = pytest.mark.usefixtures("coarse_states")
+
 BALLS = {
     "kind": "ball",
     "rolling_elements": 9,

@@ -12,6 +12,8 @@ from femgear.trains.gearbox.deflection import solve_deflection
 from femgear.trains.gearbox.modes import GearboxModes, excitation_orders, linear_system, solve_gearbox_modes
 from femgear.trains.reading import read_case, with_values
 
+pytestmark = pytest.mark.usefixtures("coarse_states")
+
 
 @pytest.fixture(scope="module")
 def found():

@@ -27,6 +27,8 @@ from femgear.trains.gearbox.power import gearbox_flow
 from femgear.trains.gearbox.solid_bodies import gearbox_bodies
 from femgear.trains.reading import read_case
 
+pytestmark = pytest.mark.usefixtures("coarse_states")
+
 
 @pytest.mark.parametrize("motions", ["space", "plane", "rotation"])
 @pytest.mark.parametrize("fixed", ["ring", "carrier"])

@@ -20,6 +20,8 @@ from femgear.trains.gearbox.response_figures import (
     short_origin,
 )
 
+pytestmark = pytest.mark.usefixtures("coarse_states")
+
 STAGES = ["first", "second"]
 
 

@@ -30,6 +30,8 @@ from femgear.trains.gearbox.sensors import sensor_rows
 from femgear.trains.gearbox.stage_structure import running_stage
 from femgear.trains.reading import read_case
 
+pytestmark = pytest.mark.usefixtures("coarse_states")
+
 
 @pytest.mark.parametrize(
     ("fixed", "torque", "motions", "planets"),

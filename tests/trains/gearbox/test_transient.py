@@ -22,6 +22,8 @@ from femgear.trains.gearbox.transient import gearbox_in_time, integrate, torsion
 from femgear.trains.reading import read_case
 from validation import drivetrain
 
+pytestmark = pytest.mark.usefixtures("coarse_states")
+
 CASES = Path(__file__).parents[3] / "cases"
 TIME = {"duration": "0.1 s", "rate": "40 kHz"}
 

@@ -21,6 +21,8 @@ from femgear.trains.gearbox.turning_planets import (
 )
 from femgear.trains.reading import read_case
 
+pytestmark = pytest.mark.usefixtures("coarse_states")
+
 
 def test_a_carrier_that_turns_or_tilts_as_a_whole_feels_no_centrifugal_force():
     tables = planetary_tables(planet={"mass": "0.4 kg", "inertia": "1e-4 kg m^2", "bearing": {"radial": "1e8 N/m"}})

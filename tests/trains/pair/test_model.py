@@ -16,6 +16,8 @@ from femgear.system.system import MeshExcitation
 from femgear.trains.impacts.model import ImpactPair
 from femgear.trains.pair.model import pair_dynamic_model, pair_model, separating_pair
 
+pytestmark = pytest.mark.usefixtures("coarse_states")
+
 STIFFNESS, TAU = 4e8, np.arange(512) / 512
 
 
