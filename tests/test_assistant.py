@@ -6,6 +6,7 @@ import io
 import json
 import subprocess
 import sys
+from importlib.util import find_spec
 from pathlib import Path
 
 import pytest
@@ -17,9 +18,11 @@ from femgear.errors import CaseError
 from femgear.trains.drafts import KINDS
 from femgear.trains.reading import read_case, with_values
 
-pytestmark = pytest.mark.usefixtures("pictures_undrawn", "coarse_states")
-
-pytest.importorskip("mcp", reason='pip install "femgear[assistant]"')
+# the library is loaded where a test needs it: by one of the workers of pytest
+pytestmark = [
+    pytest.mark.usefixtures("pictures_undrawn", "coarse_states"),
+    pytest.mark.skipif(find_spec("mcp") is None, reason='pip install "femgear[assistant]"'),
+]
 CASE = Path(__file__).parents[1] / "cases" / "spur_pair.toml"
 TOOLS = ["list_files", "read_case", "write_case", "new", "check", "run", "results", "compare", "explain"]
 

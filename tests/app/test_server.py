@@ -1,18 +1,20 @@
 """Who is let in, and what the browser may read."""
 
 import asyncio
+from importlib.util import find_spec
 
 import pytest
 
-pytest.importorskip("nicegui", reason="an extra of the package")
-
-from femgear.app.server import Guard, answers_page
+# it is loaded where a test needs it: by one of the workers of pytest
+pytestmark = pytest.mark.skipif(find_spec("nicegui") is None, reason="an extra of the package")
 
 HOSTS = {"127.0.0.1:80"}
 
 
 def answer(kind="http", query="", **headers):
     """What a request with these headers gets: the status, or the code of a closed socket; 0 where it is let in."""
+    from femgear.app.server import Guard
+
     sent = []
 
     async def inside(scope, receive, send):
@@ -60,6 +62,8 @@ def test_the_address_gives_the_key_once():
 
 
 def test_answers_are_drawn_by_scripts_of_the_page_alone():
+    from femgear.app.server import answers_page
+
     page = answers_page()
     policy = page.split('Content-Security-Policy" content="')[1].split('"')[0]
     assert policy.startswith("default-src 'none'") and "unsafe-eval" not in policy and "http" not in policy
