@@ -134,18 +134,22 @@ def keyed_faults(case: Any, gears: GearSet) -> list[tuple[str, ToothFault]]:
     """
     keyed, problems = list[tuple[str, ToothFault]](), list[GeometryError]()
     for number, gear in enumerate(gears.gears):
-        of_gear = list[tuple[str, ToothFault]]()
+        of_gear, refused = list[tuple[str, ToothFault]](), list[tuple[str, ToothFault]]()
         for i, section in enumerate(getattr(case, gear.name).fault):
             key = f"{gear.name}.fault[{i}]"
             try:
                 fault = _fault(section, gears, number)
             except GeometryError as error:
+                if error.key not in ("tooth", "planet"):
+                    copy = getattr(section, "planet", 1) - 1
+                    refused.append((key, ToothFault(number, copy, section.tooth, None)))
                 error.key = f"{key}.{error.key}"
                 problems.append(error)
                 continue
             if section.depth != 0.0 and any(section.depths or (1.0,)):
                 of_gear.append((key, fault))
-        problems += contradicting_faults(of_gear, gear)
+        # one that is refused still needs its tooth
+        problems += contradicting_faults([*of_gear, *refused], gear)
         keyed += of_gear
     for problem in problems:
         problem.file = case.location(problem.key or "")

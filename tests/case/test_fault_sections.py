@@ -237,6 +237,14 @@ def test_all_faults_that_cannot_be_are_told_at_once(healthy):
     assert "4 problems" in str(refused.value) and str(refused.value).count("remedy") == 4
 
 
+def test_a_fault_that_cannot_be_still_contradicts_a_missing_tooth(healthy):
+    problems = refusals(healthy, SPALL | {"length": "9 mm"}, GAP, CORNER | {"tooth": 5})
+    assert [problem.code for problem in problems] == ["E-FAULT"] * 2
+    length, both = problems
+    assert length.key == "sun.fault[0].length" and "tooth 3 is missing" in both.message
+    assert "sun.fault[0]" in both.remedy and "sun.fault[1]" in both.remedy
+
+
 def test_wear_of_no_depth_anywhere_is_none(healthy):
     points = {"depths": ["0 um", "0 um"], "diameters": ["41 mm", "43 mm"]}
     none = {"kind": "wear", "flank": "left", "tooth": 3} | points
