@@ -134,7 +134,7 @@ def _of_former_train(data: dict, model: str, lines: str, name: str) -> tuple[dic
     try:
         tables, unlike = tables_of(section.model_validate(data))
         text = f"the file of the former model {model} is read as a {tables['model']}, whose entries have other names"
-        remedy = "femgear gearbox FILE writes it with the entries of today"
+        remedy = "femgear gearbox FILE writes it with the entries of today, which all other warnings name"
         return tables, (Finding("W-FORMER", "model", text, remedy=remedy), *unlike)
     except ValidationError as error:
         raise combine(translate(error, section), lines, name, error.error_count()) from None
