@@ -70,7 +70,7 @@ def schema(*, model: str | None = None) -> int:
 
 @app.command
 def skill() -> int:
-    """Print what teaches an assistant how to write case files and how to read results."""
+    """Print a text that teaches an assistant how to write case files and how to read results."""
     from femgear.assistant import SKILL
 
     print(SKILL.read_text(encoding="utf-8"), end="")
@@ -96,18 +96,18 @@ def mcp(folder: Path = Path(), /) -> int:
 
 @app.command(name="app")
 def open_app(folder: Path = Path(), /, *, port: int = 0, browser: bool = True) -> int:
-    """Open the app: a window in the browser with form, sliders, answers while one drags, runs and their reports.
+    """Open the app: a window in the browser with form, sliders, answers while you drag, runs and their reports.
 
-    It serves this machine alone, and reads and writes case files and results of one folder.
+    It serves only this machine, and reads and writes only case files and results of one folder.
 
     Parameters
     ----------
     folder
         Folder of case files and results.
     port
-        Of this machine. Default: a free one.
+        Port of this machine. Default: a free one.
     browser
-        Open it in the browser; else the address is printed alone.
+        Open the window in the browser; without it only the address is printed.
     """
     from femgear.run import grid_cache
 

@@ -24,16 +24,16 @@ class ToothOptions:
     Parameters
     ----------
     teeth
-        Of sun, planet and ring, or of both gears; of planets of other kinds in the order of docs/planets.md.
+        Tooth numbers of sun, planet and ring, or of both gears; of the last four kinds as in docs/planets.md.
     shifts
         Profile shifts of sun and planet, perhaps of the ring (positive outwards), or of both gears. Default:
         none where the teeth close without, else shared by equal sliding.
     centre_distance
-        Default: that at which the shifts close the gears.
+        Centre distance. Default: the one at which the shifts close the gears.
     helix
-        Helix angle of planetary sets, pairs, gearboxes and helical cases. Default: none, of helical ones 20 deg.
+        Helix angle of planetary sets, pairs, gearboxes and helical cases. Default: 0 deg, of helical cases 20 deg.
     addendum
-        Of the basic rack, in modules. Default: 1, or what leaves less to warn of.
+        Addendum of the basic rack, in modules. Default: 1, or a value with fewer warnings.
     """
 
     teeth: Annotated[tuple[str, ...], Parameter(consume_multiple=True, negative="")] = ()
@@ -62,17 +62,19 @@ def new(
     Parameters
     ----------
     kind
-        planetary, pair, planar, helical, drivetrain, gearbox; of other planets stepped, double, ravigneaux, wolfrom.
+        planetary, pair, planar, helical, drivetrain, gearbox; with other planets stepped, double, ravigneaux, wolfrom.
     output
         Case file to write. Default: KIND.toml.
     module
-        Of helical teeth the normal one. Default: 2 mm.
-    torque, speed
-        Of sun or pinion. Default: the torque of a K factor of 1 N/mm^2, 1000 rpm.
+        Module, of helical teeth the normal one. Default: 2 mm.
+    torque
+        Torque on sun or pinion. Default: the one that gives a K factor of 1 N/mm^2.
+    speed
+        Speed of sun or pinion. Default: 1000 rpm.
     planets
-        Default: as many as equal spacing allows, three if it can be.
+        Number of planets. Default: three where equal spacing and room allow, else four or five.
     face_width
-        Default: twelve modules.
+        Face width. Default: twelve modules.
     force
         Replace the file.
     """
@@ -104,7 +106,7 @@ def teeth(
     Parameters
     ----------
     ratio
-        Speed of the driving over that of the driven member: of gear 1 over gear 2, of the sun over the carrier.
+        Speed of the driving member over that of the driven one: gear 1 over gear 2, sun over carrier.
     output
         Folder of teeth.csv, teeth.png and the case files of the best.
     """
@@ -127,7 +129,7 @@ def gearbox(
     output: Annotated[Path | None, Parameter(name=("--output", "-o"))] = None,
     force: Annotated[bool, Parameter(negative="")] = False,
 ) -> int:
-    """Write a planetary set or a pair as a gearbox of one stage; say what a gearbox has no place for.
+    """Write a planetary set or a pair as a gearbox of one stage; name what a gearbox cannot hold.
 
     Its members are bodies on springs. Shafts, rolling bearings, a casing and more stages can be added to the file. A
     file of a former model (multistage, drivetrain) is written with the entries of today.
@@ -165,7 +167,7 @@ def casing(
 ) -> int:
     """Give a gearbox a rigid casing on feet, three sensors and a run-up, all estimated, so that a run has its sound.
 
-    A set, a pair, and a file of a former model, becomes a gearbox before, as by femgear gearbox.
+    A set, a pair or a file of a former model first becomes a gearbox, as by femgear gearbox.
 
     Parameters
     ----------

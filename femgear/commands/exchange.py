@@ -30,10 +30,10 @@ def import_rexs(
     unused: Annotated[bool, Parameter(negative="")] = False,
     force: Annotated[bool, Parameter(negative="")] = False,
 ) -> int:
-    """Write the gearbox of a REXS file; say what it has not, what is assumed and not used.
+    """Write the gearbox of a REXS file; say what is missing, what is assumed and what is not used.
 
-    Where shafts and stages make no gearbox each stage becomes a case with its id in the name, NAME_28.toml, the
-    planetary one NAME.toml.
+    Where shafts and stages make no gearbox, each stage becomes a case with its id in the name, NAME_28.toml; a
+    planetary stage becomes NAME.toml.
 
     Parameters
     ----------
@@ -44,7 +44,7 @@ def import_rexs(
     stage
         Id of the only stage to take.
     load_case
-        Number of the load case, from 1. Default: the first; of single stages with the speeds of others with its torque.
+        Number of the load case, from 1. Default: the first; single stages also take the speeds of further load cases.
     unused
         List all attributes of the file that no case uses.
     force
@@ -119,7 +119,7 @@ def cad(
     case
         TOML case file of a set, a pair or a gearbox.
     output
-        File to write; the end of its name, .step or .dxf, tells the format. Default: CASE.step.
+        File to write, by the end of its name as .step or .dxf. Default: CASE.step.
     force
         Replace the file.
     """
@@ -183,7 +183,7 @@ class ModelFiles:
     fmu
         File .fmu: the vibration in time as functional mock-up unit, for co-simulation.
     fmi
-        Version of FMI of the unit, 2.0 or 3.0.
+        Version of FMI that the unit follows, 2.0 or 3.0.
     stiffness_table
         File .csv, .mat or .npz: mesh stiffness and transmission error over the angle of the first gear.
     harmonics
@@ -223,9 +223,9 @@ def export(
     Parameters
     ----------
     folder
-        Folder that femgear run wrote; for models alone a case file, too.
+        Folder that femgear run wrote; a case file will do for the state space, the FMU and the stiffness table.
     output
-        Folder of the numbers. Default: exported, inside the other.
+        Folder for the exported numbers. Default: exported, inside the folder of the run.
     """
     from femgear.run import export_results, refused_formats
     from femgear.storage.files import list_own, own_files

@@ -12,8 +12,17 @@ from cyclopts import App, Parameter
 import femgear
 from femgear.errors import CaseError
 
+
+def shown_default(value: Any) -> Any:
+    """Write the default of an option for its help; None for flags that are off and empty lists, which show none."""
+    if isinstance(value, tuple):
+        return ", ".join(str(entry) for entry in value) or None
+    return None if value is None or value is False else str(value)
+
+
 app = App(
     name="femgear",
+    default_parameter=Parameter(show_default=shown_default),
     version=lambda: femgear.__version__,
     help="Gear sets and gearboxes: from tooth geometry to the vibration and the sound at the housing.",
     help_format="plaintext",

@@ -40,7 +40,7 @@ def measured(
     causes
         Rank errors that would make the abnormal lines, with the size of each: some minutes of computation.
     stage
-        Of a gearbox: name of the planetary stage, where it has several.
+        Name of the planetary stage, of a gearbox with several.
     output
         Folder of lines.csv, order_spectrum.csv and lines.png. Default: none is written.
     """
@@ -86,9 +86,9 @@ def faults(
     Parameters
     ----------
     case
-        TOML case file of a planetary set with an elastic ring that stands still.
+        TOML case file of a planetary set with an elastic, fixed ring.
     output
-        Folder of labels.csv and of a NetCDF file for every machine. Default: orders are tabulated alone.
+        Folder of labels.csv and of a NetCDF file for every machine. Without it only the orders are tabulated.
     tolerances
         TOML file of the distributions of errors of the machines, as in docs/samples.md. Default: no errors.
     """
@@ -129,7 +129,7 @@ def rigs(
     Parameters
     ----------
     name
-        Of a rig. Default: all are listed.
+        Name of a rig. Default: all are listed.
     signal
         Recording of the healthy rig, from its owner; none is shipped.
     output

@@ -111,7 +111,7 @@ def run(
 ) -> int:
     """Compute a case and write results, pictures and report.
 
-    It prints what page one of the report answers and the verdict; of --only STAGE the table of that stage.
+    It prints the answers of page one of the report and the verdict; with --only STAGE also the table of that stage.
 
     Parameters
     ----------
@@ -131,7 +131,7 @@ def run(
     verbose
         Print the tables of all stages, and all warnings in full on a terminal too.
     json
-        Print what decides as data, and nothing else on standard output (docs/command_line.md).
+        Print answers, key figures and findings as JSON, and nothing else on standard output (docs/command_line.md).
     """
     from femgear.run import run_case
     from femgear.storage.files import resumable
@@ -242,7 +242,7 @@ def report(
     verbose
         Print the tables of all stages.
     json
-        Print what decides as data, and write no page (docs/command_line.md).
+        Print answers, key figures and findings as JSON, and write no page (docs/command_line.md).
     """
     from femgear.run import report_again
     from femgear.trains.reading import open_results
@@ -265,7 +265,7 @@ def compare(*runs: Path, output: Annotated[Path, Parameter(name=("--output", "-o
     Parameters
     ----------
     runs
-        Two or more folders that femgear run wrote, of cases of one kind; changes are those against the first.
+        Two or more folders that femgear run wrote, of cases of one kind; all are compared with the first.
     output
         Folder of the page compare.html.
     """

@@ -76,11 +76,11 @@ class DrawnSamples:
     number
         Number of samples. Default: 1000; 100 of gearboxes and pairs, each of which is solved as a run solves it.
     seed
-        Sample i of a seed is the same whatever the number of samples.
+        Seed of the random numbers. Sample i of a seed is the same whatever the number of samples.
     index
         Write this sample as a case file, sample_INDEX.toml, and compute none.
     of
-        Of gearboxes: quantities as of femgear sweep; may be repeated. Default: all that stand for the whole.
+        Of gearboxes: key figures as in femgear sweep; may be repeated. Default: all figures of the whole gearbox.
     speeds
         Of gearboxes: first and last speed of the run-up.
     """
@@ -201,17 +201,17 @@ class Search:
     Parameters
     ----------
     method
-        Of the search; auto takes derivatives where the problem has them.
+        Method of the search; auto takes derivatives where the problem has them.
     positions
         Positions over one mesh period in the search; the refinement takes those of the case, the check 128.
     flank_elements
         Elements along a flank in the search; the refinement takes those of the case, the check 32.
     samples
-        Designs before the descents. Default: five a variable.
+        Random designs before the descents. Default: five a variable.
     max_designs
         Designs after which search and refinement end.
     seed
-        Of the samples.
+        Seed of the random designs.
     check
         Run case and optimum anew into the folders before and after.
     """
@@ -233,24 +233,24 @@ class Sought:
     Parameters
     ----------
     vary
-        As "sun.modifications[0].amount=0 um..15 um +- 1 um" with its tolerance, or "KEY1,KEY2=0 um..15 um" of
-        entries with one value; may be repeated. Default: a tip relief more on every loaded flank, its amount
-        and its start; gearboxes have none.
+        Entries to vary, as "sun.modifications[0].amount=0 um..15 um +- 1 um" with a tolerance, or "KEY1,KEY2=0 um..15
+        um" for entries with one value; may be repeated. Default: amount and start of one more tip relief on every
+        loaded flank; gearboxes have no default.
     shape
-        Of these reliefs; a linear one begins with a kink, under which the contact pressure rises (W-KINK).
+        Shape of the reliefs; a linear one begins with a kink, under which the contact pressure rises (W-KINK).
     goal
         What to minimise: ste (largest of the next three), ste overall, ste sun-planet, ste planet-ring, mesh
         force, peak mesh force, housing, contact pressure, root stress sun (planet, ring), contact ratio
         sun-planet (planet-ring), tip thickness sun (planet, ring); of gearboxes K_Hbeta, STE, level, ... of the
         whole or of one part, as in "level top".
     limit
-        As in "root stress sun <= 300 MPa"; of the same quantities. May be repeated.
+        Limit on one of these quantities, as "root stress sun <= 300 MPa"; may be repeated.
     of
         Further quantities to report; may be repeated. Default: transmission errors, mesh forces, housing.
     second
         Second goal: the Pareto front of both is searched as well.
     torque
-        Of the input. Default: that of the case.
+        Torque on the input. Default: that of the case.
     speeds
         First and last speed of the input, for mesh forces and the housing, by default 1000 and 3500 rpm; of
         gearboxes those of the run-up, by default as in the case.
@@ -353,13 +353,13 @@ def relief(
     output
         Folder of relief.toml, tip_relief.csv, tip_relief.png and the journal.
     torque
-        Of the input, to design for. Default: that of the case.
+        Torque on the input, to design for. Default: that of the case.
     also
-        Further torques of maps; may be repeated. Default: half and one and a half times the first.
+        Further torques with a map each; may be repeated. Default: half and one and a half times the first.
     largest
         Largest amount searched. Default: twice the mean deflection of the sun-planet meshes.
     shape
-        Of the relief; a linear one begins with a kink, under which the contact pressure rises (W-KINK).
+        Shape of the relief; a linear one begins with a kink, under which the contact pressure rises (W-KINK).
     points
         Points of the map along each parameter.
     positions
@@ -455,11 +455,11 @@ def harris(
     relief
         Tip relief of sun and planets (sun side), such as "4 um"; may be repeated.
     length
-        Of the reliefs, in lengths of two-pair contact: 1 starts at the ends of single-pair contact.
+        Length of the reliefs, in lengths of two-pair contact: 1 starts at the ends of single-pair contact.
     shape
-        Of the reliefs; a linear one begins with a kink, under which the contact pressure rises (W-KINK).
+        Shape of the reliefs; a linear one begins with a kink, under which the contact pressure rises (W-KINK).
     torque
-        Of the input; may be repeated. Default: 11 from a tenth to twice the case's.
+        Torque on the input; may be repeated. Default: 11 torques from a tenth to twice that of the case.
     positions
         Positions over one mesh period. Default: those of the case.
     """
