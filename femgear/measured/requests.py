@@ -30,8 +30,10 @@ class Recording:
         Acceleration that a one in the file stands for, as "1 g" or "98.1 m/s^2". Default: the unit that the file names.
     within
         Share of that speed within which the one is searched at which the lines stand best on orders of the set.
-    begin, end
-        Times of the file between which samples are taken [s]. Default: all.
+    begin
+        Time of the file from which on samples are taken [s]. Default: its first.
+    end
+        Time of the file up to which samples are taken [s]. Default: its last.
     """
 
     channel: str | None = None
