@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from femgear.case.dependencies import fingerprint
+from femgear.case.dependencies import Steps, fingerprint
 from femgear.case.gear_set import planetary_set
 from femgear.errors import CaseError, FemgearError, StorageError, nvh_library
 from femgear.exchange.dynamic_model import DynamicModel, StiffnessTable
@@ -135,12 +135,12 @@ def solve(case: ReadCase, only: str | None = None, *, progress: Progress = silen
         Before anything is computed: what the stages cannot represent; no such stage (E-STAGE).
     """
     case, stages = _asked(case, only)
-    results = Solution(case)
+    results, steps = Solution(case), Steps()
     with one_blas_thread():
         for stage in stages:
             progress(stage.name, 0, 1)
             taken = map(results.get, stage.takes)
-            results[stage.name] = stage.solve(case, *taken, **_options(stage, progress))
+            results[stage.name] = stage.solve(case, *taken, **_options(stage, progress, steps))
             progress(stage.name, 1, 1)
     return results
 
@@ -278,9 +278,9 @@ def _asked(case: ReadCase, only: str | None) -> tuple[Any, tuple[Stage, ...]]:
     return (case if only is None else stages[-1].asked(case)), tuple(stages)
 
 
-def _options(stage: Stage, progress: Progress) -> dict[str, Any]:
-    """Options of a stage: folder of grids, and whom to tell how far it has come."""
-    options = {"cache": grid_cache(), "progress": progress}
+def _options(stage: Stage, progress: Progress, steps: Steps) -> dict[str, Any]:
+    """Options of a stage: folder of grids, whom to tell how far it has come, and what stages before it have left."""
+    options = {"cache": grid_cache(), "progress": progress, "steps": steps}
     return {name: options[name] for name in stage.options if name in options}
 
 
@@ -316,6 +316,8 @@ class _Run:
         Findings of every stage, under "" those of the case.
     pending : dict
         Results that a run could go on from and that are not written yet.
+    steps : Steps
+        What its stages have in common, such as the excitation of dynamics and run-up.
     """
 
     folder: Path
@@ -325,6 +327,7 @@ class _Run:
     data: dict[str, Contents | xr.Dataset] = field(default_factory=dict)
     findings: dict[str, tuple[Finding, ...]] = field(default_factory=dict)
     pending: dict[str, Any] = field(default_factory=dict)
+    steps: Steps = field(default_factory=Steps)
 
     def keep(self, case: ReadCase, *, least: float = 0.0) -> None:
         """Write the pending results of a case, those of ``least`` seconds or more."""
@@ -426,7 +429,7 @@ def _compute(
     """Solve a stage and write its file, part after part with those stages that take its result alone."""
     following = () if stage.parts is None else (later for later in stages if later.takes == (stage.name,))
     members, verdicts, files = [stage, *following], defaultdict(list), dict[str, Path]()
-    taken, options = map(results.get, stage.takes), _options(stage, progress)
+    taken, options = map(results.get, stage.takes), _options(stage, progress, run.steps)
     seconds, start = defaultdict(float), time.perf_counter()
     progress(stage.name, 0, 1)
     if stage.parts is None:
@@ -436,7 +439,9 @@ def _compute(
     with ExitStack() as opened:
         for part, first in parts:
             for member in members:
-                computed = first if member is stage else member.solve(part, first, **_options(member, progress))
+                computed = (
+                    first if member is stage else member.solve(part, first, **_options(member, progress, run.steps))
+                )
                 path, data = run.folder / f"{member.name}.nc", _contents(computed)
                 if part is case:
                     run.findings[member.name] = member.findings(data)

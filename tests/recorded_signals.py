@@ -1,5 +1,7 @@
 """Recordings made by femgear itself: lines of a coarse set, with noise, a speed that wanders, and pulses."""
 
+from itertools import chain
+
 from validation.recordings import CASE, COARSE, RATE, computed_lines, recording
 
 __all__ = ["CASE", "COARSE", "HEALTHY", "RATE", "computed_lines", "recording", "write_columns"]
@@ -9,8 +11,8 @@ HEALTHY = {3: 0.31, 213: 0.29, 216: 0.03j, 219: 0.31, 318: 0.07, 321: -0.97, 324
 
 
 def write_columns(path, heading, columns, *, separator=";", comma=False, digits="%.9g"):
-    """Write columns of numbers as text."""
-    rows = [separator.join(digits % x for x in row) for row in zip(*columns)]
-    text = "\n".join(rows)
-    path.write_text(heading + (text.replace(".", ",") if comma else text) + "\n", encoding="utf-8")
+    """Write columns of numbers as text, all by one format, which is faster than one a row."""
+    numbers = tuple(chain.from_iterable(zip(*columns)))
+    text = (separator.join([digits] * len(columns)) + "\n") * (len(numbers) // len(columns)) % numbers
+    path.write_text(heading + (text.replace(".", ",") if comma else text), encoding="utf-8")
     return path

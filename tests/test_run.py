@@ -9,7 +9,9 @@ from shutil import copytree, disk_usage
 import numpy as np
 import pytest
 import xarray as xr
+from casings import casing_tables
 from edited_manifests import edit_manifest
+from small_gearbox import pair_tables
 
 from femgear.errors import CaseError, StorageError
 from femgear.findings import as_data
@@ -19,6 +21,7 @@ from femgear.storage import files
 from femgear.storage.files import append_dataset, checksum, read_dataset, read_result, write_result
 from femgear.storage.results import read_manifest, run_folder
 from femgear.trains.elastic import stages as elastic
+from femgear.trains.gearbox import stage_structure
 from femgear.trains.helical import stages as helical
 from femgear.trains.reading import read_case, with_values
 
@@ -278,7 +281,7 @@ def test_speeds_in_parts_are_those_solved_together(name, parts, option, limit, m
 def same(whole, parts):
     """Numbers to rounding as docs/results.md has it, of the size of their variable; texts and units."""
     page = (CASES.parent / "docs" / "results.md").read_text(encoding="utf-8")
-    assert "within 1e-12 of the largest of a variable, and within 1e-7 of the residual" in page
+    assert "within 1e-12 of the largest of a variable, residuals within 1e-7" in page
     texts = ({name: str(value) for name, value in one.attrs.items()} for one in (whole, parts))
     assert next(texts) == next(texts) and whole.sizes == parts.sizes and [*whole] == [*parts]
     for name, expected in whole.variables.items():
@@ -408,3 +411,26 @@ def test_mesh_stiffness_over_angle_and_torque():
 def test_a_kind_of_case_without_the_curve_is_refused(name):
     with pytest.raises(CaseError, match="no mesh stiffness over the position"):
         mesh_stiffness(CASES / f"{name}.toml")
+
+
+@pytest.mark.parametrize("writes", [False, True])
+def test_stages_of_a_run_share_the_record_of_their_teeth(writes, tmp_path, monkeypatch):
+    """Dynamics, the longer excitation that it is compared with, and the run-up excite with the same teeth."""
+    tables = pair_tables(teeth=True) | {"casing": casing_tables(), "dynamics": {"up_to": "1 kHz"}}
+    tables["sensor"] = [{"name": "top", "position": ["90 mm", "80 mm", "40 mm"], "direction": "y"}]
+    tables["runup"] = {"from": "900 rpm", "to": "1100 rpm", "count": 2}
+    walks, compute = [], stage_structure.loaded_period
+
+    def counted(*given, **options):
+        walks.append(given)
+        return compute(*given, **options)
+
+    monkeypatch.setattr(stage_structure, "loaded_period", counted)
+    case = read_case(tables)
+    if writes:
+        with run_folder(tmp_path / "run") as place:
+            run_case(case, place, pictures=False)
+        stages = set(read_manifest(tmp_path / "run").timings)
+    else:
+        stages = set(solve(case))
+    assert {"dynamics", "runup"} <= stages and len(walks) == 1

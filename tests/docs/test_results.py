@@ -5,6 +5,8 @@ from pathlib import Path
 
 import pytest
 
+from femgear.stages import assumptions
+
 pytestmark = pytest.mark.usefixtures("coarse_states")
 
 PATH = Path(__file__).parents[2] / "validation" / "tools" / "results_page.py"
@@ -18,7 +20,14 @@ def results_page():
     return module
 
 
-def test_tables_are_those_of_the_files(results_page):
+@pytest.fixture
+def one_assumption(monkeypatch):
+    """What a level rests on is changed entry by entry: their number is a length of the tables, not a variable."""
+    every = assumptions.assumed
+    monkeypatch.setattr(assumptions, "assumed", lambda *given: every(*given)[:1])
+
+
+def test_tables_are_those_of_the_files(results_page, one_assumption):
     page = results_page.PAGE.read_text(encoding="utf-8")
     remedy = "run python validation/tools/results_page.py -o docs/results.md"
     assert page == results_page.page(page, results_page.variables()), remedy
