@@ -23,7 +23,7 @@ def validate(
     output : path or None
         Page, the rows beside it with the ending ``.csv``; None writes none.
     theme : str, optional
-        Compute this theme alone and print each of its rows.
+        Compute this theme alone, by its name or title, and print each of its rows.
     quick : bool
         Leave out what takes long.
     progress : callable, optional
@@ -48,7 +48,8 @@ def validate(
     from validation.run import run_validation
     from validation.themes import THEMES
 
-    chosen = THEMES if theme is None else tuple(one for one in THEMES if one.name == theme)
+    name = None if theme is None else theme.casefold()
+    chosen = tuple(one for one in THEMES if name in (None, one.name.casefold(), one.title.casefold()))
     if not chosen:
         raise _unknown_theme(theme, [one.name for one in THEMES])
     with one_blas_thread():  # sums of several threads differ in the last digits

@@ -129,7 +129,8 @@ def _checked(case: Any, request: WearRequest) -> float | None:
             if train_of(case).meshing_teeth is None:
                 message = f"{train_of(case).words} has no contact of its teeth under load, so nothing wears"
                 limit = "planetary sets, pairs and gearboxes whose teeth are given"
-                raise CaseError(message, code="E-MODEL", key="model", limit=limit, remedy="femgear gearbox CASE")
+                remedy = "femgear new planetary, pair or gearbox writes a case with teeth"
+                raise CaseError(message, code="E-MODEL", key="model", limit=limit, remedy=remedy)
         for option, value, (low, high), unit in (
             ("--hours", request.hours, _HOURS, "h"),
             ("--coefficient", request.coefficient, _COEFFICIENT, "m^2/N"),

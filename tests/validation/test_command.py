@@ -143,10 +143,11 @@ def test_exit_code_and_page_of_the_command(tmp_path, monkeypatch, capsys, row, c
 
 def test_one_theme_prints_its_rows_and_writes_no_page(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
-    themes = tuple(Theme(name, name, "", (lambda row=row: (row,),)) for name, row in (("a", GOOD), ("b", BAD)))
+    themes = tuple(Theme(name, f"The {name}", "", (lambda row=row: (row,),)) for name, row in (("a", GOOD), ("b", BAD)))
     monkeypatch.setattr(validation_themes, "THEMES", themes)
     assert main(["--theme", "a"]) == 0
     out = capsys.readouterr().out
+    assert main(["--theme", "the A"]) == 0 and capsys.readouterr().out == out  # by its title too
     assert f"passes {GOOD.case}: {GOOD.quantity}" in out and BAD.quantity not in out
     assert main(["--theme", "b"]) == 3
     assert capsys.readouterr().out.count(f"FAILS {BAD.case}: {BAD.quantity}") == 1
