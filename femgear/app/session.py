@@ -40,6 +40,7 @@ class Session:
         self.folder = folder.resolve()
         self.name, self.text = "", ""
         self._saved: str | None = None
+        self._kept: str | None = None  # in the draft, by this session: other windows have the same file for theirs
         self._before: list[str] = []
         self._after: list[str] = []
 
@@ -51,7 +52,7 @@ class Session:
     @property
     def unsaved(self) -> bool:
         """Whether the text is not that of the file."""
-        return self._saved != self.text
+        return (self._saved or "") != self.text
 
     def open(self, name: str) -> bool:
         """Read a case file, or what was edited of it and not saved; tells whether it is the latter.
@@ -62,12 +63,12 @@ class Session:
             E-FILE: no case file of the folder. E-ENCODING: no text.
         """
         path = _case_file(self.folder, name)
-        text = _read(path)
-        self.name, self._saved, self._before, self._after = name, text, [], []
-        draft = _draft(path)
-        self.text = _read(draft) if draft.is_file() else text
-        if self.text == text:
-            draft.unlink(missing_ok=True)
+        saved, draft = _read(path) if path.is_file() else None, _draft(path)
+        self.name, self._saved, self._before, self._after = name, saved, [], []
+        self._kept = _read(draft) if draft.is_file() else None
+        self.text = (saved or "") if self._kept is None else self._kept
+        if not self.unsaved:
+            self._drop_draft()
         return self.unsaved
 
     def begin(self, name: str, text: str) -> None:
@@ -131,8 +132,15 @@ class Session:
         if self.name:
             if self.unsaved:
                 files.write_text(self.text, _draft(self.path))
+                self._kept = self.text
             else:
-                _draft(self.path).unlink(missing_ok=True)
+                self._drop_draft()
+
+    def _drop_draft(self) -> None:
+        """Remove the draft, where it is that of this session and not of another window."""
+        draft = _draft(self.path)
+        if draft.is_file() and _read(draft) in (self._kept, self.text):
+            draft.unlink(missing_ok=True)
 
     def save(self) -> None:
         """Write the case file.
@@ -150,7 +158,7 @@ class Session:
             )
         files.write_text(self.text, self.path)
         self._saved = self.text
-        _draft(self.path).unlink(missing_ok=True)
+        self._drop_draft()
 
     def save_as(self, name: str) -> None:
         """Write the text as a new case file, which is edited from now on; the former file stays as it is saved."""

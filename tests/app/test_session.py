@@ -65,6 +65,27 @@ def test_a_new_file_is_there_once_it_is_saved(tmp_path):
         session.begin("new.toml", "")
 
 
+def test_what_was_begun_and_never_saved_is_saved_after_it_is_opened_again(tmp_path):
+    Session(tmp_path).begin("new.toml", "a = 1\n")
+    again = Session(tmp_path)
+    assert again.open("new.toml") and again.text == "a = 1\n" and case_files(tmp_path) == ["new.toml"]
+    again.save()
+    assert (tmp_path / "new.toml").read_text() == "a = 1\n" and not (tmp_path / ".new.toml.draft").exists()
+
+
+def test_the_draft_of_another_window_stays(tmp_path):
+    (tmp_path / "a.toml").write_text("a = 1\n")
+    first, second = Session(tmp_path), Session(tmp_path)
+    for session, text in ((second, "a = 2\n"), (first, "a = 3\n")):
+        session.open("a.toml")
+        session.replace(text)
+    second.keep()
+    first.keep()
+    second.save()
+    assert (tmp_path / ".a.toml.draft").read_text() == "a = 3\n"
+    assert Session(tmp_path).open("a.toml")
+
+
 @pytest.mark.parametrize(
     "name", ("../a.toml", "/etc/a.toml", "a.txt", "sub/a.toml", "", ".a.toml", "a\x00.toml", 300 * "a" + ".toml")
 )
