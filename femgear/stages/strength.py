@@ -72,6 +72,7 @@ OF_TEETH = (
     "W-PASSES",
     "W-DEFLECTION",
     "W-OPEN",
+    "W-FAULT",
 )
 """Codes of the findings that concern safeties and lives alike: limits, and load factors of the contact."""
 OF_ROOTS = (*OF_TEETH, "W-RIM")

@@ -27,6 +27,7 @@ from femgear.stages.judgements import (
     unrated_gears,
     without_life,
 )
+from femgear.stages.strength import OF_ROOTS
 
 ROOT, FLANK = Least(1.92, "root of the planet"), Least(1.21, "flank of the sun")
 
@@ -75,6 +76,13 @@ def test_gears_that_nothing_rates_deserve_a_look_and_are_named():
     # what no gear has is said once
     whole = judge_strength(ROOT, None, StrengthSection(), unrated=["S_H of gear 1", "gear 2"])
     assert whole.limit.endswith("; S_H and gear 2 are not rated")
+
+
+def test_safeties_of_faulty_teeth_deserve_a_look():
+    """They are those of whole teeth: ISO 6336 knows no crack in a root."""
+    fault = Finding("W-FAULT", "planet.fault[0]", "text", severity=DOUBT)
+    part = judge_strength(ROOT, FLANK, StrengthSection(), "", [fault], OF_ROOTS)
+    assert part.state == "look" and "effects of a fault left out" in part.limit
 
 
 def test_what_no_steel_carries_fails_whatever_its_safeties():

@@ -28,6 +28,9 @@ from femgear.stages.train_judgements import judge_teeth
 from femgear.trains.elastic.results import known_factors, level_changes, level_doubts, marked_level, rate_set
 from femgear.trains.elastic.runup import loudest
 
+_STANDS_OUT = 0.1
+"""Share of the power of all lines from which on the largest one stands out of them."""
+
 
 def set_with_ring_judgements(results: Any) -> Iterator[Judgement]:
     """Judge a planetary set with an elastic ring."""
@@ -64,7 +67,8 @@ def _noise(results: Any) -> Judgement:
     origin = _origin(round(order), results.case.ring.teeth)
     line_words = f"order {order:g} of the carrier"
     place = f"{origin}{hertz:,.0f} Hz{_nearest_mode(results, hertz)}"
-    main = f"its largest line, {line_words} ({place}), makes {share:.0%} of the power"
+    main = f"{'its' if share >= _STANDS_OUT else 'no line stands out, the'} largest line, {line_words} ({place}), makes"
+    main += f" {share:.0%} of the power"
     sentence = f"At {speed:,.4g} rpm the housing has {_bound_in_words(size_words)}: {main}"
     if decisive := most_decisive(results):
         sentence += f", with half and twice of what is assumed: {decisive}"
@@ -111,14 +115,14 @@ def _origin(order: int, teeth: int) -> str:
 
 
 def _nearest_mode(results: Any, hertz: float) -> str:
-    """Write the mode nearest to a frequency, empty without modes or where none is within a fifth."""
+    """Write the mode nearest to a frequency, empty without modes or where none is as near as a resonance is."""
     if "modes" not in results.stages:
         return ""
     frequency = results.modes["frequency"].values
     mode = int(np.abs(frequency - hertz).argmin())
-    if abs(frequency[mode] - hertz) > 0.2 * hertz:
+    if 100.0 * abs(frequency[mode] - hertz) > NEAR_RESONANCE * frequency[mode]:
         return ""
-    return f", mode {mode + 1}: {results.modes['kind'].values[mode]}"
+    return f", near mode {mode + 1}: {results.modes['kind'].values[mode]}"
 
 
 def _resonance(runup: Any) -> str:

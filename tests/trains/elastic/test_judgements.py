@@ -67,7 +67,7 @@ def judged(results):
 def test_the_main_line_is_that_of_the_acceleration_with_its_mode(results):
     noise = judged(results)
     assert (
-        "its largest line, order 216 of the carrier (mesh harmonic 2, 2,160 Hz, mode 2: ring), makes 80% of"
+        "its largest line, order 216 of the carrier (mesh harmonic 2, 2,160 Hz, near mode 2: ring), makes 80% of"
         in noise.sentence
     )
     assert noise.sentence.endswith("Loudest of the run-up: 9 m/s² at 4,000 rpm, the end of its range")
@@ -138,3 +138,13 @@ def test_a_limit_of_the_microphone_holds_in_operation(results):
     results.case = with_values(results.case, {"housing.microphone": {"level_limit": 60}})
     results.housing["pressure_level"] = ("speed", [63.5])
     assert judged(results).limit == "3.5 dB over the limit at the microphone, 3,000 rpm"
+
+
+def test_no_line_stands_out_of_many_and_a_far_mode_is_not_named(results):
+    results.housing["level"][:] = 12.0
+    results.modes["frequency"].values[1] = 2500.0
+    sentence = judged(results).sentence
+    assert (
+        "no line stands out, the largest line, order 216 of the carrier (mesh harmonic 2, 2,160 Hz), makes 6% of"
+        in sentence
+    )
