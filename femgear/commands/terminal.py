@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import os
 import sys
 import textwrap
 import threading
@@ -114,7 +115,7 @@ def print_briefly(blocks, warned: int = 0) -> None:
 
 
 def _as_text(blocks) -> str:
-    """Write blocks of `femgear.report.page` as tables, as wide as the terminal, or in 120 columns."""
+    """Write blocks of `femgear.report.page` as tables, as wide as the terminal or COLUMNS, else in 120 columns."""
     from rich import box
     from rich.console import Console
     from rich.table import Table
@@ -122,7 +123,7 @@ def _as_text(blocks) -> str:
     from femgear.report.tables import merged
 
     console = Console(markup=False, highlight=False, emoji=False)
-    if not console.is_terminal:
+    if not console.is_terminal and not os.environ.get("COLUMNS", "").isdigit():
         console.width = 120
     with console.capture() as captured:
         for block in blocks:

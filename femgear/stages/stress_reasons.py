@@ -230,4 +230,4 @@ def reason_row(data: xr.Dataset) -> Iterator[tuple[str, str]]:
         for reason in stress_reasons(data)
     ]
     if texts:
-        yield f"FE over ISO 6336, beyond {DIFFERS:g}", ", ".join(texts)
+        yield f"FE over ISO 6336, outside 1/{DIFFERS:g} to {DIFFERS:g}", ", ".join(texts)

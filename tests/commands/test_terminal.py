@@ -31,6 +31,14 @@ def test_no_number_of_a_table_breaks_in_a_narrow_terminal(width, capsys, monkeyp
     assert text.count("speed") == {60: 3, 80: 2, 120: 1}[width]
 
 
+@pytest.mark.parametrize(("columns", "width"), [("72", 72), ("", 120), ("wide", 120)])
+def test_a_file_has_the_columns_that_are_asked_for(columns, width, capsys, monkeypatch):
+    monkeypatch.setenv("COLUMNS", columns)
+    terminal.print_blocks([Block("Table", (), (("name", "many words " * 40),))])
+    lines = capsys.readouterr().out.splitlines()
+    assert width - 12 < max(map(len, lines)) <= width
+
+
 def test_equal_rows_that_follow_one_another_are_one(capsys):
     rows = (
         *(("sun-planet 1", "4.02"), ("sun-planet 2", "4.02"), ("sun-planet 3", "4.02")),

@@ -174,7 +174,7 @@ def _unheard(results: Any) -> Judgement:
 
 
 def _noise(results: Any) -> Judgement:
-    """Judge the level at the loudest sensor, with its main line and the way most of it comes by."""
+    """Judge the level at the loudest sensor, with its main line and the way the largest part of it comes by."""
     data, modes = results.dynamics, results.modes if "modes" in results.stages else None
     level = data["level"].values[0]
     sensor = int(level.argmax())
@@ -193,7 +193,7 @@ def _noise(results: Any) -> Judgement:
     sentence = f"At {speed:,.4g} rpm sensor {name} has {size_words}: {line_words}{near} makes {share:.0%} of the power"
     resonance = "" if modes is None else resonance_of_line(line_words, hertz, modes["frequency"].values, share)
     if "path_share" in data:
-        sentence += f"; most of it comes by {main_way(data, sensor)}"
+        sentence += f"; the largest part comes by {main_way(data, sensor)}"
     if "runup" in results.stages and "level" in results.runup:
         sentence += f". Loudest of the run-up: {_loudest_of_run_up(results.runup, marks, name)}"
     open_words = "give sensor.level_limit, or femgear compare sets two runs beside one another"

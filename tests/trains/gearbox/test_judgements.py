@@ -52,7 +52,7 @@ def test_the_questions_of_a_gearbox_in_a_casing(results):
     near = f" near {mode}," if mode else ""
     assert f"{near} makes {power:.0%} of the power" in sentence
     way = data["path"].values[int(data["path_share"].values[0, :, sensor].argmax())]
-    assert f"most of it comes by {way} (" in sentence and "Loudest of the run-up: " in sentence
+    assert f"the largest part comes by {way} (" in sentence and "Loudest of the run-up: " in sentence
 
 
 def test_a_gearbox_whose_main_line_is_beside_a_mode_deserves_a_look(results):
