@@ -18,6 +18,9 @@ import pytest
 for _name in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS"):
     os.environ.setdefault(_name, "1")
 
+# workers of pytest have one for their own lines; tables of tests are as wide as in a file
+os.environ.pop("COLUMNS", None)
+
 # a shell starts what goes on in the background deaf to Ctrl-C, which many tests send
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
     signal.signal(signal.SIGINT, signal.default_int_handler)
