@@ -86,7 +86,7 @@ def test_known_lines_of_a_spectrum(kind, tmp_path):
 
 def test_factor_of_a_case_without_a_spectrum(tmp_path):
     done = run(tmp_path, "--harmonics", 1, "--half-width", 4)
-    assert done.returncode == 0 and "multiples of 3 alone" in done.stdout
+    assert done.returncode == 0 and "only multiples of 3" in done.stdout
     rows = table(tmp_path / "out" / "array_factor.csv")
     found = {int(row["carrier order"]): (round(float(row["array factor"]), 9), row["symmetry"]) for row in rows}
     assert found == {o: (1.0, "") if o % 3 == 0 else (0.0, "forbidden") for o in range(104, 113)}
