@@ -132,7 +132,8 @@ def read_back(kind: str, *, noise: float = 1e-3, rate: float = PULSE_RATE) -> tu
     order, value = computed_lines(kind)
     loud = np.abs(value) > _LEFT_OUT * np.abs(value).max()
     order, value = order[loud], value[loud]
-    signal, pulses, _ = recording(order, value, noise=noise, rate=rate)
+    # 120 turns: lines of a planet's tooth lie a tenth of an order apart, twelve bins
+    signal, pulses, _ = recording(order, value, seconds=40.0, noise=noise, rate=rate)
     form = FORMATS[kind]
     with tempfile.TemporaryDirectory() as folder:
         path = written(Path(folder), form, signal, pulses, rate)

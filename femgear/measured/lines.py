@@ -34,6 +34,8 @@ _REACH = 3
 """Bins on either side of a line that a Hann window fills, and one more."""
 _BESIDE = 12
 """Bins without a line of which the noise beside one is taken."""
+_SCALLOPING = 1.43
+"""What a line half way between two bins of a Hann window is lower in either of them [dB]."""
 _BETWEEN_BINS = 1.08
 """Error of a line between two bins over that of one on a bin."""
 VERDICTS = (NORMAL, UNEQUAL, "error or fault of the sun", "error or fault of a planet", "not from this gearbox")
@@ -69,15 +71,39 @@ def sharpened_lines(spectrum: OrderSpectrum, threshold: float) -> tuple[np.ndarr
 
     amplitude, step = spectrum.amplitude, 1.0 / spectrum.turns
     around = max(_AROUND, round(_ORDERS_AROUND / step)) | 1
-    bins = find_lines(spectrum.order, amplitude, threshold=threshold)
+    bins = find_lines(spectrum.order, amplitude, threshold=threshold - _SCALLOPING)
     # mirrored at the ends: a low end that is repeated would be its own median
     noise = median_filter(amplitude, min(around, len(amplitude)), mode="mirror")
-    bins = bins[(bins < len(amplitude) - 1) & (amplitude[bins] > _ABOVE_NOISE * noise[bins])]
+    bins = bins[bins < len(amplitude) - 1]
+    stands = amplitude[bins] > _ABOVE_NOISE * noise[bins]
+    # where lines are dense the median is that of lines: what is left between those that stand out is the noise
+    between = _noise_between(amplitude, bins[~stands], bins[stands], around)
+    stands[~stands] = amplitude[bins[~stands]] > _ABOVE_NOISE * between
+    bins = bins[stands]
     left, right = amplitude[bins - 1], amplitude[bins + 1]
     ratio = np.maximum(left, right) / amplitude[bins]
     away = np.clip((2.0 * ratio - 1.0) / (1.0 + ratio), 0.0, 0.5)
     height = amplitude[bins] * (1.0 - away**2) / np.sinc(away)
-    return spectrum.order[bins] + np.where(right > left, away, -away) * step, height
+    loud = height >= 10.0 ** (threshold / 20.0) * height.max(initial=0.0)
+    return (spectrum.order[bins] + np.where(right > left, away, -away) * step)[loud], height[loud]
+
+
+def _noise_between(amplitude: np.ndarray, at: np.ndarray, lines: np.ndarray, around: int) -> np.ndarray:
+    """Find the median around bins (k,) of the bins that neither lines (n,) nor they reach; infinite where few are left.
+
+    Bins beside a line that a Hann window fills are taken out, two on either side.
+    """
+    empty = np.ones(len(amplitude), bool)
+    for reach in range(1 - _REACH, _REACH):
+        empty[np.clip(lines + reach, 0, len(empty) - 1)] = False
+    noise = np.full(len(at), np.inf)
+    for number, place in enumerate(at):
+        first, last = max(place - around // 2, 0), place + around // 2 + 1
+        left = empty[first:last].copy()
+        left[max(place - first - _REACH + 1, 0) : place - first + _REACH] = False
+        if left.sum() >= _BESIDE:
+            noise[number] = np.median(amplitude[first:last][left])
+    return noise
 
 
 def level_uncertainty(
