@@ -182,7 +182,7 @@ def test_short_teeth_have_short_outlines(tmp_path):
 
 def test_what_is_not_drawn_is_told(tmp_path, capsys):
     case = read_case(CASES / "planetary_27_40_108.toml")
-    wear = {"kind": "wear", "tooth": 3, "flank": "left", "depth": "5 um"}
+    wear = {"kind": "wear", "tooth": 4, "flank": "left", "depth": "5 um"}
     faulty = with_values(case, {"sun.fault": [{"kind": "missing", "tooth": 3}, wear]})
     (tmp_path / "case.toml").write_text(to_toml(faulty), encoding="utf-8")
     assert main(["cad", str(tmp_path / "case.toml"), "-o", str(tmp_path / "case.dxf")]) == 0
