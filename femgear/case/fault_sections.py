@@ -351,10 +351,12 @@ def _contradiction(
 def _worn_through(gear: Gear, of_body: Sequence[tuple[str, ToothFault]]) -> Iterator[GeometryError]:
     """Refuse pits and wear of a body that take off all of a tooth together, of which each alone would not."""
     material = [(key, fault) for key, fault in of_body if isinstance(fault, Spall | Wear)]
-    rolls = np.linspace(*sorted((gear.form_roll, gear.tip_roll)), _PLACES)
+    first, last = sorted((gear.form_roll, gear.tip_roll))
+    rolls = np.linspace(first, last, _PLACES)
     for tooth in {fault.tooth for _, fault in material}:
         of_tooth = [(key, fault) for key, fault in material if fault.tooth in (None, tooth)]
-        taken = sum(removed([fault for _, fault in of_tooth if fault.flank == side], rolls) for side in (LEFT, RIGHT))
+        left, right = ([fault for _, fault in of_tooth if fault.flank == side] for side in (LEFT, RIGHT))
+        taken = removed(left, rolls) + removed(right, rolls)
         thickness = tooth_thickness(gear, np.hypot(gear.base_radius, rolls))
         if len(of_tooth) > 1 and (taken >= thickness).any():
             worst = int(np.argmax(taken - thickness))

@@ -291,14 +291,16 @@ def _acting(
     meshes = [mesh for mesh in gears.meshes if mesh.kind == kind]
     for fault in faults:
         for place in (0, 1):
-            on = np.zeros(tooth.shape[1:], bool)
+            on: np.ndarray = np.zeros(tooth.shape[1:], bool)
             for row, mesh in enumerate(meshes):
                 body = gears.bodies[mesh.bodies[place]]
                 same = body.gear == fault.gear and body.copy == fault.copy
                 if same and fault.flank in (None, sides[place, row]):
                     teeth = gears.gears[body.gear].teeth
                     on[row] = fault.tooth is None or (tooth[place, row] - fault.tooth) % teeth == 0
-            if isinstance(fault, Spall) and fault.across and slices > 1:
-                on &= fault.in_slices(slices)[np.arange(on.shape[1]) % slices, None]
+            pit: ToothFault = fault
+            covered = pit.in_slices(slices) if isinstance(pit, Spall) and pit.across and slices > 1 else None
+            if covered is not None:
+                on &= covered[np.arange(on.shape[1]) % slices, None]
             if on.any():
                 yield fault, place, on

@@ -305,7 +305,7 @@ def part_orders(
     ring, sun, planet = teeth
     rates = ("sun", sun and Fraction(ring + sun, sun), symmetry), ("planet", planet and Fraction(ring, planet), 1)
     for part, rate, step in rates:
-        if not rate or (rate / step).denominator == 1:
+        if not rate or (Fraction(rate) / step).denominator == 1:
             continue
         turns = range(counted_turns(part, teeth, symmetry, tolerance) + 1)
         yield step, np.array(sorted({float(sign * turn * rate % step) for turn in turns for sign in (1, -1)}))

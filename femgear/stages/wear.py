@@ -111,7 +111,8 @@ def worn_flanks(teeth: MeshingTeeth, *, hours: float, coefficient: float, points
     flanks = dict[tuple[str, int, str], WornFlank]()
     for number, mesh in enumerate(gears.meshes):
         pair = mesh_pairs(gears)[mesh.kind]
-        zeta = np.linspace(*pair.path, points)
+        start, end = pair.path
+        zeta = np.linspace(start, end, points)
         line_load = _mean_load(static, number, zeta) / gears.mesh_widths[mesh.kind]
         rolls = [pair.roll_on(place, zeta) for place in (0, 1)]
         for place, body in enumerate(mesh.bodies):

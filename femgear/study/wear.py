@@ -91,13 +91,15 @@ def wear_of_case(
     """
     speed = _checked(case, request)
     check_case(case)
+    meshing_teeth = train_of(case).meshing_teeth
+    assert meshing_teeth is not None  # others are refused
     halves = request.steps // 2
     steps, done, total = Steps(), 0, request.steps + max(halves - 1, 0)
 
     def contact(worn: Any) -> Sequence[MeshingTeeth]:
         nonlocal done
         progress("wear", done, total)
-        teeth = train_of(worn).meshing_teeth(worn, speed, cache=cache, steps=steps)
+        teeth = meshing_teeth(worn, speed, cache=cache, steps=steps)
         done += 1
         progress("wear", done, total)
         return teeth

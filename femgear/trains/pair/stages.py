@@ -457,7 +457,7 @@ def _dynamic_model(case: PairCase, results: Mapping[str, Any]) -> DynamicModel:
 
 
 def loaded_pair(
-    case: PairCase, speed: float | None = None, *, cache: Path | None = None, steps: Steps | None = None
+    case: Any, speed: float | None = None, *, cache: Path | None = None, steps: Steps | None = None
 ) -> tuple[MeshingTeeth, ...]:
     """Solve the contact of the teeth of a pair, and find its mesh frequency at a speed of gear 1 [rad/s].
 
