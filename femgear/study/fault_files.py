@@ -25,6 +25,7 @@ from femgear.study.fault_records import (
     FaultPlan,
     MachineRecords,
     fault_plan,
+    longest_first,
     record_case,
     solve_machine,
 )
@@ -66,7 +67,7 @@ def fault_records_into(
         return [], _write_alone(plan, folder, further.index, further)
     machines = range(-(-request.count // plan.each))
     with resumable(folder):
-        left = [machine for machine in machines if not _is_there(plan, folder / _name(machine))]
+        left = longest_first(plan, (machine for machine in machines if not _is_there(plan, folder / _name(machine))))
         outcomes = (runner or Runner()).map(partial(solve_machine, plan), left)
         for done, (index, outcome) in enumerate(outcomes, len(machines) - len(left) + 1):
             if isinstance(outcome, FemgearError):

@@ -7,7 +7,7 @@ import pytest
 
 from femgear.errors import CaseError
 from femgear.run import grid_cache, solve
-from femgear.study.fault_records import fault_plan, machine_case, record_case, solve_machine
+from femgear.study.fault_records import fault_plan, longest_first, machine_case, record_case, solve_machine
 from femgear.study.fault_request import FaultRequest
 from femgear.trains.reading import parse_case, read_case, with_values
 
@@ -97,6 +97,18 @@ def test_kinds_come_in_turn_and_draws_differ(plan):
     assert len({speed for case in cases for speed in case.operation.speeds}) == 8
     assert len({error.tobytes() for error in errors}) == 4
     assert all(50.0 <= case.operation.torque <= 100.0 for case in cases)
+
+
+def test_machines_that_take_longest_are_begun_first(case):
+    plan = fault_plan(case, FaultRequest(count=80, each=2, seed=3, duration="0.05 s"), cache=grid_cache())
+    order = longest_first(plan, range(40))
+    assert sorted(order) == list(range(40))
+    faults = [machine_case(plan, machine)[1] for machine in order]
+    rings = [fault.kind == "crack" and fault.gear == "ring" for fault in faults]
+    assert any(rings) and rings == sorted(rings, reverse=True)
+    kinds = [fault.kind for fault in faults if fault.kind != "crack"]
+    assert list(dict.fromkeys(kinds))[:3] == ["missing", "broken corner", "spall"]
+    assert set(kinds[-8:]) == {"healthy", "wear"}
 
 
 def test_noise_may_be_none(case):
