@@ -567,13 +567,10 @@ def export_results(
             files.append(f"{name}.csv")
         progress("csv", len(results.stages), len(results.stages))
     if "xlsx" in formats:
-        progress("xlsx", 0, 1)
-        tables = (table for stage in results for table in tables_of(results[stage], stage))
-        if long := write_workbook(tables, folder / "results.xlsx"):
+        if long := write_workbook(_tables_of_stages(results, progress), folder / "results.xlsx"):
             text = f"tables that no sheet can hold are left out: {', '.join(long)}"
             tell(Finding("W-ROWS", "", text, remedy="export them with --csv"))
         files.append("results.xlsx")
-        progress("xlsx", 1, 1)
     if "mat" in formats:
         progress("mat", 0, 1)
         write_matlab({stage: results[stage] for stage in results}, folder / "results.mat")
@@ -593,6 +590,14 @@ def export_results(
         signals = _told(recorded.signals(results, how), progress, steps)
         files += _export_sound(signals, folder, formats, how)
     return files
+
+
+def _tables_of_stages(results: Results, progress: Progress) -> Iterator[tuple[str, Any]]:
+    """Tables of all stages of a run for a workbook, with the stages that are done told as its progress."""
+    for number, stage in enumerate(results):
+        progress("xlsx", number, len(results.stages))
+        yield from tables_of(results[stage], stage)
+    progress("xlsx", len(results.stages), len(results.stages))
 
 
 def refused_formats(results: Results, formats: Collection[str]) -> dict[str, FemgearError]:

@@ -6,12 +6,16 @@ which the file states; nothing is normalised.
 
 from __future__ import annotations
 
+import io
 import struct
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
+from html import escape
+from itertools import count, islice
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
+from zipfile import ZIP_DEFLATED, ZipFile
 
 import numpy as np
 
@@ -24,6 +28,12 @@ if TYPE_CHECKING:
 _QUANTITIES = {"m/s^2": 12, "Pa": 15}
 """Specific data type of a unit: universal file, dataset 58, record 9."""
 _ROWS = 1_048_576  # of a sheet: ECMA-376 leaves it open, Excel has no more
+_SHEET, _SPREADSHEET = "xl/worksheets/sheet{}.xml", "http://schemas.openxmlformats.org/spreadsheetml/2006/main"
+"""Part of a workbook that holds a sheet, by its number from 1, and the names of its elements."""
+_ROWS_TOGETHER = 4096
+"""Rows of a sheet that are compressed at once."""
+_SHEET_EFFORT = 3
+"""Of the compression of a workbook, from 1 to 9."""
 
 
 SCALES = {"Pa": "pressure_scale", "m/s^2": "acceleration_scale", "N": "force_scale"}
@@ -197,27 +207,68 @@ def write_workbook(tables: Iterable[tuple[str, Any]], path: Path) -> list[str]:
     """
     with nvh_library("spreadsheets"):
         from openpyxl import Workbook
-        from openpyxl.cell import WriteOnlyCell
-    book, titles, long = Workbook(write_only=True), set[str](), list[str]()
-    for name, frame in tables:
-        if len(frame) >= _ROWS:
-            long.append(f"{name} ({len(frame)} rows)")
-            continue
-        sheet = book.create_sheet(_sheet_name(name, titles))
-
-        def cell(value: Any, sheet=sheet) -> Any:
-            if isinstance(value, int) or (isinstance(value, float) and np.isfinite(value)):
-                return value
-            cell_ = WriteOnlyCell(sheet, printable(str(value)))
-            cell_.data_type = "s"  # a beginning = would make it a formula
-            return cell_
-
-        sheet.append([cell(str(column)) for column in frame.columns])
-        for row in frame.itertuples(index=False):
-            sheet.append([cell(value) for value in row])
-    with replaced_file(path) as temporary:
-        book.save(temporary)
+    book, titles, long = Workbook(), set[str](), list[str]()
+    book.remove(book.worksheets[0])
+    with replaced_file(path) as temporary, ZipFile(temporary, "w", ZIP_DEFLATED, compresslevel=_SHEET_EFFORT) as parts:
+        for name, frame in tables:
+            if len(frame) >= _ROWS:
+                long.append(f"{name} ({len(frame)} rows)")
+                continue
+            book.create_sheet(_sheet_name(name, titles))
+            with parts.open(_SHEET.format(len(titles)), "w", force_zip64=True) as sheet:
+                rows = _sheet_rows(frame)
+                while block := "".join(islice(rows, _ROWS_TOGETHER)):
+                    sheet.write(block.encode())
+        if not titles:  # a book without a sheet cannot be opened
+            book.create_sheet()
+        # the library makes all but the rows, for which it takes ten times as long as all the rest
+        shell = io.BytesIO()
+        book.save(shell)
+        written = set(parts.namelist())
+        with ZipFile(shell) as others:
+            for part in others.namelist():
+                if part not in written:
+                    parts.writestr(part, others.read(part))
     return long
+
+
+def _sheet_rows(frame: Any) -> Iterator[str]:
+    """Write a pandas table as the sheet of a workbook (ECMA-376-1, 18.3), part by part: its beginning, rows, end."""
+    letters = [_column_letters(number) for number in range(frame.shape[1])]
+    yield f'<worksheet xmlns="{_SPREADSHEET}"><sheetData>'
+    row = "".join(f'<c r="{letter}{{0}}"{{{place}}}' for place, letter in enumerate(letters, start=1))
+    write = f'<row r="{{0}}">{row}</row>'.format
+    yield write(1, *(_sheet_cell(str(column)) for column in frame.columns))
+    columns = [_sheet_cells(frame.iloc[:, place]) for place in range(frame.shape[1])]
+    yield from map(write, count(2), *columns)
+    yield "</sheetData></worksheet>"
+
+
+def _sheet_cells(column: Any) -> Iterable[str]:
+    """Cells of a column: what follows their places."""
+    values = column.tolist()
+    if column.dtype.kind in "iu" or (column.dtype.kind == "f" and np.isfinite(column.to_numpy()).all()):
+        return (f"><v>{value!r}</v></c>" for value in values)
+    if all(isinstance(value, str) for value in values):
+        cells = {value: _sheet_cell(value) for value in set(values)}  # names stand in many rows
+        return map(cells.__getitem__, values)
+    return map(_sheet_cell, values)
+
+
+def _sheet_cell(value: Any) -> str:
+    """Cell of a value: what follows its place."""
+    if isinstance(value, bool):
+        return f' t="b"><v>{value:d}</v></c>'
+    if isinstance(value, int) or (isinstance(value, float) and np.isfinite(value)):
+        return f"><v>{value!r}</v></c>"
+    # as text of its own, a beginning = makes no formula
+    return f' t="inlineStr"><is><t xml:space="preserve">{escape(printable(str(value)), quote=False)}</t></is></c>'
+
+
+def _column_letters(number: int) -> str:
+    """Letters of a column by its number from 0: A to Z, then AA."""
+    above, place = divmod(number, 26)
+    return (_column_letters(above - 1) if above else "") + chr(ord("A") + place)
 
 
 def _sheet_name(name: str, titles: set[str]) -> str:
