@@ -1,5 +1,6 @@
 """Files for other programs, read back by the libraries that other programs use."""
 
+import gc
 import re
 import struct
 import sys
@@ -326,6 +327,19 @@ def test_a_sheet_takes_little_longer_than_to_write_its_numbers(tmp_path):
     assert workbook_seconds < 5.0 * (time.process_time() - start)
     rows = list(load_workbook(tmp_path / "a.xlsx", read_only=True)["a"].iter_rows(values_only=True))
     assert rows == [tuple(frame.columns), *frame.itertuples(index=False, name=None)]
+
+
+def test_an_interrupted_workbook_leaves_no_file_and_no_words_of_a_library(tmp_path, monkeypatch):
+    def stop(value):
+        raise KeyboardInterrupt
+
+    ignored, frame = [], pd.DataFrame({"a": [1.0, np.nan, 3.0]})
+    monkeypatch.setattr(sys, "unraisablehook", ignored.append)
+    monkeypatch.setattr(formats, "_sheet_cell", stop)
+    with pytest.raises(KeyboardInterrupt):
+        write_workbook([("a", frame)], tmp_path / "a.xlsx")
+    gc.collect()
+    assert [str(failure.exc_value) for failure in ignored] == [] and list(tmp_path.iterdir()) == []
 
 
 @pytest.mark.parametrize(("columns", "last"), [(26, "Z"), (27, "AA"), (52, "AZ"), (703, "AAA")])
