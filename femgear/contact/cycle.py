@@ -120,7 +120,7 @@ class CycleOptions:
         Coefficient of friction of every kind of mesh, over the force in the transverse section; negative where gear
         2 drives. See `femgear.contact.flank_friction`; none of back flanks, nor of members that tilt.
     progress : callable, optional
-        Called with (positions done, positions).
+        Called with (positions done, positions); with 0 where positions are solved anew, in other windows.
     """
 
     cells: int = 36
@@ -537,6 +537,8 @@ class _Walk:
     ) -> tuple[MeshWindows, _Solved]:
         """Solve some positions (n,) with gears turned by arcs (M, P) [m]; others are taken from ``before``."""
         options = self.options
+        if options.progress is not None:
+            options.progress(0, len(self.empty.position) // self.repeats)
         tau, each = self._places(), 1 if options.ahead is None else len(options.ahead)
         setup = mesh_windows(
             self.sector,

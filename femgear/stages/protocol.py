@@ -46,6 +46,33 @@ def silent(stage: str, done: float, total: float) -> None:
     """Tell nobody how far a stage has come."""
 
 
+def counting_on(progress: Progress, stage: str) -> Callable[[float, float], None]:
+    """Count the steps of rounds that follow one another on, so that a stage does not seem to begin anew.
+
+    Parameters
+    ----------
+    progress : callable
+        Called with (stage, steps of all rounds so far, and those with all steps of this round).
+    stage : str
+
+    Returns
+    -------
+    callable
+        ``(done, total)`` of the round; one begins where nothing is done, which is told with its first step.
+    """
+    earlier_rounds = largest_done = 0.0
+
+    def tell(done: float, total: float) -> None:
+        nonlocal earlier_rounds, largest_done
+        if done == 0:
+            earlier_rounds, largest_done = earlier_rounds + largest_done, 0.0
+            return
+        largest_done = max(largest_done, done)
+        progress(stage, earlier_rounds + largest_done, earlier_rounds + total)
+
+    return tell
+
+
 @lru_cache(maxsize=1)
 def _libraries(modules: int) -> ThreadpoolController:
     """Find the libraries that have threads: milliseconds, spent again once more modules are loaded."""

@@ -82,7 +82,7 @@ from femgear.gears.pair import GearSet
 from femgear.gears.planetary import PlanetarySet
 from femgear.gears.profile import base_helix_angle
 from femgear.stages.drawing_tables import drawing_attributes
-from femgear.stages.protocol import Progress, Stage, one_blas_thread, silent
+from femgear.stages.protocol import Progress, Stage, counting_on, one_blas_thread, silent
 from femgear.stages.static_results import (
     SLICES,
     StaticResult,
@@ -160,7 +160,7 @@ def solve_static(
         pressures=case.static.stresses and periods == 1 and case.static.slices < 2,
         peaks=case.static.peaks,
         friction=acting_friction(case, gears),
-        progress=partial(progress, "contact"),
+        progress=counting_on(progress, "contact"),
         **width,
     )
     cycle = walk_mesh_cycle(gears, bodies, options=options, **_walk(case, gears, deviations, periods))

@@ -81,6 +81,17 @@ def test_stages_are_solved_in_memory(path):
         solve(read_case(path), "housing")
 
 
+def test_rounds_of_a_stage_are_counted_on():
+    from femgear.stages.protocol import counting_on
+
+    seen = []
+    tell = counting_on(lambda *step: seen.append(step), "modes")
+    # a second process takes parts from the end; a round may be given up before its end
+    for done, total in [(0, 9), (3, 9), (9, 9), (6, 9), (0, 4), (1, 4), (0, 4), (4, 4)]:
+        tell(done, total)
+    assert seen == [("modes", *step) for step in [(3, 9), (9, 9), (9, 9), (10, 13), (14, 14)]]
+
+
 @pytest.mark.skipif(not sys.platform.startswith("linux"), reason="asks /proc for the memory in use")
 def test_blas_that_finds_no_more_memory_does_not_hang():
     program = """

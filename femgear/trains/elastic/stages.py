@@ -73,6 +73,7 @@ from femgear.stages.protocol import (
     Recorded,
     Stage,
     Train,
+    counting_on,
     modes_verdict,
     one_blas_thread,
     response_verdict,
@@ -243,7 +244,7 @@ def solve_modes(
     steps, gears, torque = steps or Steps(), static.planetary_set, static.sun_torque
     bodies, deviations = _ring_bodies(case, static, steps), set_deviations(case)
     friction, entries = acting_friction(case, gears), state_entries(case)
-    loading, name = partial(_loading, case, static, steps, partial(progress, "modes")), "loaded state"
+    loading, name = partial(_loading, case, static, steps, counting_on(progress, "modes")), "loaded state"
     state = steps.kept(name, entries) or steps.keep(name, entries, loaded_period(gears, *bodies, **loading(friction)))
     stiffness = state.resampled("held_stiffness", record_count(gears, state.periods)).mean(axis=1)
     mesh_mode = highest_mesh_mode(case, gears, stiffness, sun_torque=torque)

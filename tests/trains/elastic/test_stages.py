@@ -252,6 +252,15 @@ def test_progress_counts_the_positions(case, steps):
     assert seen[-1] == ("contact", 13, 13)
 
 
+def test_progress_of_modes_counts_on_from_round_to_round(case, static, steps):
+    """Positions come in rounds where the stiffness is steep: none of them begins again at one."""
+    seen = []
+    solve_modes(case, static, progress=lambda *step: seen.append(step), steps=Steps())
+    done, total = ([step[place] for step in seen] for place in (1, 2))
+    assert {step[0] for step in seen} == {"modes"} and len(set(total)) > 1
+    assert done == sorted(done) and total == sorted(total) and done[-1] == total[-1]
+
+
 @pytest.mark.parametrize(("points", "teeth", "expected"), [(7, 108, 26), (1000, 108, 26), (54, 40, 19)])
 def test_nodal_diameters_do_not_depend_on_the_points_of_the_housing(case, points, teeth, expected):
     changed = case.model_copy(
