@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import json
 import warnings
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import KW_ONLY, dataclass, field, fields, replace
 from typing import Any, NamedTuple
 
@@ -636,6 +636,12 @@ def once(findings: Iterable[Finding], stage: str = "") -> tuple[Finding, ...]:
     """List findings of a stage, each once and in their order; without a stage they keep theirs."""
     copies = from_data(as_data(findings))  # of whatever class
     return tuple(dict.fromkeys(replace(finding, stage=stage) if stage else finding for finding in copies))
+
+
+def counted(findings: Sequence[Finding]) -> str:
+    """Count findings by their severity, the most severe first: ``"2 doubts, 1 note"``; empty of none."""
+    counts = {severity: sum(finding.severity == severity for finding in findings) for severity in reversed(SEVERITIES)}
+    return ", ".join(f"{count} {severity}{'s' * (count > 1)}" for severity, count in counts.items() if count)
 
 
 def by_severity(findings: Iterable[Finding]) -> list[Finding]:

@@ -21,7 +21,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from femgear.errors import printable
-from femgear.findings import SEVERITIES, Finding, by_severity, remark
+from femgear.findings import Finding, by_severity, counted, remark
 from femgear.report.charts import chart
 from femgear.report.explorer import DRAWN, EXPLORER
 from femgear.report.solid import SOLID
@@ -170,7 +170,7 @@ def page(train: Train, results: Results, *, static: bool = False) -> str:
     warnings = [*by_severity(results.findings), *skipped]
     numbers = {block.title: block for block in train.describe_results(results)} | train.describe_stages(results)
     sections = [*(stage.title for stage in train.stages), _OTHER]
-    notice = f'<p class="warn"><a href="#warnings">Warnings: {_counted(warnings)}</a></p>\n' if warnings else ""
+    notice = f'<p class="warn"><a href="#warnings">Warnings: {counted(warnings)}</a></p>\n' if warnings else ""
     unfolded = not data  # without scripts nothing opens what is folded away for paper
     charts = data.get("charts", {})
     gears, verdict = train.describe(case), tuple(train.verdict(results))
@@ -203,16 +203,6 @@ def document(title: str, main: str, data: dict[str, Any] | None, *, script: str 
         f"<title>{title}</title>\n<style>{(_WEB / 'page.css').read_text('utf-8')}</style>\n</head>\n<body>\n"
         f"<main>\n{main}</main>\n{scripts}</body>\n</html>\n"
     )
-
-
-def _counted(warnings: Sequence[Finding]) -> str:
-    """Count warnings, and those of them that make numbers doubtful."""
-    severe = [
-        f"{count} {severity}{'s' * (count > 1)}"
-        for severity in reversed(SEVERITIES[1:])
-        if (count := sum(warning.severity == severity for warning in warnings))
-    ]
-    return f"{len(warnings)}{' (' + ', '.join(severe) + ')' if severe else ''}"
 
 
 def _scripts(data: dict[str, object], script: str) -> str:

@@ -7,6 +7,7 @@ own with the functions of this module; the page shows them as cards, and joins t
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
@@ -14,7 +15,7 @@ from typing import Any, Literal
 import numpy as np
 
 from femgear.case.sections import StrengthSection
-from femgear.findings import CATALOGUE, DOUBT, FAULT, NOTE, Finding, in_words
+from femgear.findings import CATALOGUE, DOUBT, FAULT, NOTE, Finding, counted, in_words
 from femgear.report.tables import Block, merged_names
 from femgear.stages.life_results import SYMBOLS, first_to_fail, hours_text
 from femgear.stages.strength import OF_ROOTS, RatedFlank, Rating, gear_words
@@ -37,6 +38,8 @@ _RAISED = 0.5
 """Change of a level by a longer excitation from which on the higher one is compared with the limit too [dB]."""
 MOST_DOUBTS = 4
 """Doubts that the card of the numbers names."""
+_AGAINST = {"S_F": "against breakage", "S_H": "against pitting"}
+"""What safeties are against."""
 _BEYOND = "W-PRESSURE", "W-STRENGTH"
 """Codes of the findings that no steel carries the load."""
 
@@ -254,6 +257,9 @@ def judge_strength(
         return Judgement(STRONG, "open", stresses or "not rated", without.remedy, sentence)
     low = [(symbol, least, required) for symbol, least, required in rated if not least.value >= required]
     answer = ", ".join(f"{symbol} {least.value:.2f} ({least.where})" for symbol, least, _ in rated)
+    in_sentence = ", ".join(
+        f"{symbol} {least.value:.2f} {_AGAINST[symbol]} ({least.where})" for symbol, least, _ in rated
+    )
     limit = (
         f"{' and '.join(f'{symbol} at least {required:g}' for symbol, _, required in rated)}, ISO 6336:{limits.edition}"
     )
@@ -262,11 +268,15 @@ def judge_strength(
     reasons = _doubts(findings, doubts)
     limit = "; ".join(filter(None, (limit, open_factors, missing, reasons)))
     if low:
-        failing = " and ".join(f"{symbol} {least.value:.2f} of the {least.where}" for symbol, least, _ in low)
+        failing = " and ".join(
+            f"{symbol} {least.value:.2f} {_AGAINST[symbol]} ({least.where})" for symbol, least, _ in low
+        )
         return Judgement(STRONG, "bad", answer, limit, f"Not strong enough: {failing}")
     if missing:
-        return Judgement(STRONG, "look", answer, limit, f"Strong enough as far as it is rated: {answer}; {missing}")
-    return Judgement(STRONG, "look" if reasons else "good", answer, limit, f"Strong enough: {answer}")
+        return Judgement(
+            STRONG, "look", answer, limit, f"Strong enough as far as it is rated: {in_sentence}; {missing}"
+        )
+    return Judgement(STRONG, "look" if reasons else "good", answer, limit, f"Strong enough: {in_sentence}")
 
 
 def judge_lives(
@@ -535,7 +545,7 @@ def judge_noise(
     margins : sequence of LevelMargin
         Of the levels that have a limit.
     doubts : str
-        Doubts of the levels, in words: below a limit such levels deserve a look.
+        Doubts of the levels, in words: such levels deserve a look, below a limit and without one.
     rests_on : str
         What they rest on that is estimated, in words.
     """
@@ -549,9 +559,18 @@ def judge_noise(
             return Judgement(QUIET, "bad", answer, doubted(worst.words), f"{sentence}. Too loud: {worst.words}")
         state: State = "look" if resonance or doubts else "good"
         return Judgement(QUIET, state, answer, doubted(resonance, worst.words), sentence)
-    if resonance:
-        return Judgement(QUIET, "look", answer, doubted(resonance), sentence)
-    return Judgement(QUIET, "open", answer, doubted(open_words), sentence)
+    return Judgement(
+        QUIET, "look" if resonance or doubts else "open", answer, doubted(resonance or open_words), sentence
+    )
+
+
+def _doubts_by_code(doubts: Sequence[Finding]) -> str:
+    """Name doubts by their codes, with how many have the same: ``"too few harmonics (W-TAIL) twice"``."""
+    numbers = Counter(finding.code for finding in doubts if finding.code)
+    times = {1: "", 2: " twice"}
+    words = [f"{in_words(code)}{times.get(number, f' {number} times')}" for code, number in numbers.items()]
+    more = f" and {len(words) - MOST_DOUBTS} more" if len(words) > MOST_DOUBTS else ""
+    return f"{', '.join(words[:MOST_DOUBTS])}{more}"
 
 
 def judge_numbers(findings: Sequence[Finding], complete: bool) -> Judgement:
@@ -567,11 +586,7 @@ def judge_numbers(findings: Sequence[Finding], complete: bool) -> Judgement:
         words = ", ".join(map(in_words, dict.fromkeys(finding.code for finding in beyond)))
         return Judgement(SURE, "bad", "numbers are far beyond their model", words, f"Numbers hold nothing: {words}")
     if doubts:
-        codes = list(dict.fromkeys(finding.code for finding in doubts if finding.code))
-        shown = ", ".join(map(in_words, codes[:MOST_DOUBTS]))
-        shown += f" and {len(codes) - MOST_DOUBTS} more" if len(codes) > MOST_DOUBTS else ""
-        count = len(codes) or len(doubts)
-        limit = "; ".join(filter(None, (shown, estimates_words(findings))))
-        return Judgement(SURE, "look", f"{count} doubt{'s' * (count > 1)}", limit)
+        limit = "; ".join(filter(None, (_doubts_by_code(doubts), estimates_words(findings))))
+        return Judgement(SURE, "look", counted(doubts), limit)
     limit = "; ".join(filter(None, ("solutions converged, samples resolve them", estimates_words(findings))))
     return Judgement(SURE, "good", "no doubt was raised", limit)

@@ -168,13 +168,13 @@ def load_sharing(static: xr.Dataset) -> Figure:
     if len(names) == 1:
         ax.set_ylim(0.0, 1.5 * equal)
         size = f"{'up to ' * ('alike' in names[0][0])}{share.max():.4g} %"
-        title = f"all {len(share)} planets carry {size} at every position; mean shares K_γ = {factor:.3f}"
+        title = f"all {len(share)} planets carry {size} at every position; as means K_γ = {factor:.3f}"
     else:
         ax.axhline(equal, color=GREY, linewidth=1.2, linestyle=":", label=f"equal share {equal:.4g} %")
         highest = share.max(axis=1)
         most = f"planet {static['planet'].values[highest.argmax()]}"
         most = "every planet" if np.ptp(highest) < ALIKE * highest.max() else most
-        title = f"{most} carries up to {share.max():.4g} % at a position; mean shares K_γ = {factor:.3f}"
+        title = f"{most} carries up to {share.max():.4g} % at one position; over all positions K_γ = {factor:.3f}"
         title += f", {held}" if largest > UNEQUAL else ""
     label(ax, position_words(position), "share of the torque [%]", title)
     if len(names) > 1:

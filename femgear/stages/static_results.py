@@ -64,7 +64,7 @@ _COUNTING = (
     "one load cycle an engagement, from zero to the largest load of the tooth (peak counting between "
     "crossings of zero, ASTM E1049)"
 )
-HELD = "all centres held"
+HELD = "gear axes fixed"
 SERIES = "of planet-ring with the ring's foundation; the STE with all supports"
 """What mesh stiffness and transmission error contain where members move."""
 _PIN_FORCE = "force of the pin on the planet in the frame of the carrier"

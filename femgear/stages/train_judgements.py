@@ -115,16 +115,10 @@ def _judge_faults(results: Any) -> Iterator[Judgement]:
     """Say which teeth of a case are faulty, and what that does; nothing of whole teeth."""
     faults = fault_words(results.case)
     if faults:
-        effects = "; ".join(fault_effects(results))
+        effects = "; ".join(fault_effects(results)) or "nothing is known: this run has no stage that shows it"
         answer = ", ".join(faults[:_MOST_FAULTS])
         answer += f" and {len(faults) - _MOST_FAULTS} more" if len(faults) > _MOST_FAULTS else ""
-        sentence = ". ".join(filter(None, (f"Faulty: {answer}", _capital(effects))))
-        yield Judgement(FAULTY, "look", answer, "what it does stands above, what is left out in the warnings", sentence)
-
-
-def _capital(text: str) -> str:
-    """Begin a text with a capital letter."""
-    return f"{text[:1].upper()}{text[1:]}"
+        yield Judgement(FAULTY, "look", answer, effects, f"Faulty: {answer}")
 
 
 def _missing_factors(results: Any, rating: Rating | None, shown: Sequence[Least]) -> list[str]:
@@ -156,7 +150,7 @@ def _motion(results: Any, dynamic: np.ndarray | None) -> str:
         kinds = kind_names(results.dynamics["mesh"].values)
         dynamic = computed_dynamic_factor(results.dynamics, len(kinds))
     if dynamic is not None:
-        parts.append(f"K_v {_joined(dynamic, '.2f')}")
+        parts.append(f"dynamic factor K_v {_joined(dynamic, '.2f')}")
     text = ", ".join(parts)
     return f"{text} ({', '.join(kinds)})" if " and " in text and kinds else text
 

@@ -243,7 +243,7 @@ def test_load_sharing_says_what_the_planets_carry(defect, words):
     share = static["load_share"].values
     title = ax.get_title(loc="left")
     factor, _, held = title.rpartition("= ")[2].partition(", ")
-    assert held == ("all centres held" if defect else "")
+    assert held == ("gear axes fixed" if defect else "")
     assert float(factor) == pytest.approx(3.0 * share.mean(axis=1).max(), abs=6e-4)
     most = int(share.max(axis=1).argmax()) + 1
     assert title.startswith(words.replace("planet 3", f"planet {most}"))
@@ -268,7 +268,7 @@ def test_the_table_of_meshes_shows_soft_ones():
 
 def test_tables_explain_what_holds_the_members_and_what_the_solver_says():
     unequal, equal = (describe_static(synthetic.static(defect=one)).notes[0] for one in (0.2, 0.0))
-    assert "all centres held, K_gamma = 1.0" in unequal and "K_gamma" not in equal
+    assert "gear axes fixed, K_gamma = 1.0" in unequal and "K_gamma" not in equal
     words = " ".join(describe_response(synthetic.dynamics()).notes)
     assert "radius: by what a step of the fixed point multiplies the error" in words
     assert "Floquet: largest growth of a disturbance" in words and "dynamic transmission error" in words

@@ -36,12 +36,15 @@ def test_safeties_are_judged_by_those_asked_for():
     asked = StrengthSection(required_root_safety=1.4, required_flank_safety=1.0)
     holds = judge_strength(ROOT, FLANK, asked)
     assert holds.state == "good" and holds.limit == "S_F at least 1.4 and S_H at least 1, ISO 6336:2019"
-    assert holds.sentence == "Strong enough: S_F 1.92 (root of the planet), S_H 1.21 (flank of the sun)"
+    assert holds.sentence == (
+        "Strong enough: S_F 1.92 against breakage (root of the planet), S_H 1.21 against pitting (flank of the sun)"
+    )
     more = StrengthSection(required_root_safety=2.0, required_flank_safety=1.25, edition=2006)
     fails = judge_strength(ROOT, FLANK, more)
     assert fails.state == "bad" and fails.limit.endswith("ISO 6336:2006")
     assert (
-        fails.sentence == "Not strong enough: S_F 1.92 of the root of the planet and S_H 1.21 of the flank of the sun"
+        fails.sentence == "Not strong enough: S_F 1.92 against breakage (root of the planet) "
+        "and S_H 1.21 against pitting (flank of the sun)"
     )
     # a safety that is exactly the one asked for holds, one without a number does not
     assert judge_strength(Least(1.4, ""), Least(1.0, ""), asked).state == "good"
@@ -224,6 +227,11 @@ def test_a_level_without_a_limit_is_judged_by_resonances_alone():
     assert judge_noise("1 m/s²", "so").state == "open"
 
 
+def test_a_doubtful_level_deserves_a_look_with_and_without_a_limit():
+    doubtful = judge_noise("> 9 m/s²", "so", open_words="no resonance", doubts="doubt: excitation falls short")
+    assert (doubtful.state, doubtful.limit) == ("look", "no resonance; doubt: excitation falls short")
+
+
 def test_a_line_beside_a_mode_is_the_resonance_of_a_level_of_which_it_makes_half():
     modes = np.array([0.0, 1200.0, 3780.0])
     words = resonance_of_line("mesh harmonic 1 at 3,750 Hz", 3750.0, modes, 0.98)
@@ -261,8 +269,8 @@ def test_numbers_are_judged_by_the_findings():
     judged = judge_numbers([doubt, fault, doubt], complete=True)
     assert (judged.state, judged.answer, judged.limit) == (
         "look",
-        "1 doubt",
-        "too few harmonics (W-TAIL)",
+        "2 doubts",
+        "too few harmonics (W-TAIL) twice",
     )
     # gears that fail say nothing against their numbers
     assert judge_numbers([fault], complete=True).state == "good"

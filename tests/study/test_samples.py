@@ -367,7 +367,7 @@ def test_the_command_writes_numbers_figure_and_the_worst_sample(case, tmp_path, 
     words = ["samples", str(path), "--tolerances", str(TOLERANCES), "-o", str(out), "--seed", "3"]
     assert main([*words, "-n", "30"]) == 0
     said = capsys.readouterr().out
-    assert "all centres held" in said and "--only static" in said and "in series" not in said
+    assert "gear axes fixed" in said and "--only static" in said and "in series" not in said
     data = read_dataset(out / "samples.nc")
     assert data.sizes["sample"] == 30 and data.attrs["seed"] == 3 and "sigma" in data.attrs["tolerances"]
     assert data.transmission_error.attrs["units"] == "m"
@@ -437,7 +437,7 @@ def test_members_that_move_share_better_and_are_told(case, tmp_path):
     path = tmp_path / "pins.toml"
     path.write_text('pin_errors.tangential = { distribution = "normal", sigma = "3 um" }', encoding="utf-8")
     medians = []
-    for members, note in (("fixed", "all centres held"), ("elastic", "planet-ring with the ring on its fou")):
+    for members, note in (("fixed", "gear axes fixed"), ("elastic", "planet-ring with the ring on its fou")):
         one = with_value(case, "static.members", members)
         (block, *_), _ = samples_into(one, tmp_path / members, prepared(one, path, cache=grid_cache()), count=20)
         assert [note in line for line in block.notes].count(True) == 1

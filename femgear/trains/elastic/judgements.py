@@ -50,9 +50,7 @@ def _noise(results: Any) -> Judgement:
     at = int(level.argmax())
     speed = float(speeds[at])
     at_microphone = (
-        f" ({float(housing['pressure_level'][at]):.1f} dB(A) re 20 µPa at the microphone)"
-        if "pressure_level" in housing
-        else ""
+        f" ({float(housing['pressure_level'][at]):.1f} dB(A) at the microphone)" if "pressure_level" in housing else ""
     )
     marks = Marks(results.findings)
     size_words = f"{marked_level(results, at, marks, level_doubts(results, [at]).get(at, ()))} m/s²{at_microphone}"
@@ -65,9 +63,10 @@ def _noise(results: Any) -> Judgement:
     hertz = order * carrier / (2.0 * np.pi)
     share = 0.5 * (size[line] / level[at]) ** 2 if level[at] > 0.0 else 0.0
     origin = _origin(round(order), results.case.ring.teeth)
-    line_words = f"order {order:g} of the carrier"
-    place = f"{origin}{hertz:,.0f} Hz{_nearest_mode(results, hertz)}"
-    main = f"{'its' if share >= _STANDS_OUT else 'no line stands out, the'} largest line, {line_words} ({place}), makes"
+    line_words = f"{hertz:,.0f} Hz, {order:g} times a turn of the carrier"
+    place = ", ".join(filter(None, (origin, _nearest_mode(results, hertz))))
+    main = f"{'its' if share >= _STANDS_OUT else 'no line stands out, the'} largest line, {line_words}"
+    main += f" ({place}), makes" if place else ", makes"
     main += f" {share:.0%} of the power"
     sentence = f"At {speed:,.4g} rpm the housing has {_bound_in_words(size_words)}: {main}"
     if decisive := most_decisive(results):
@@ -78,7 +77,6 @@ def _noise(results: Any) -> Judgement:
         sentence += f". Loudest of the run-up: {_bound_in_words(levels[-1])}"
         resonance = _resonance(results.runup)
     elif "modes" in results.stages:
-        line_words += f" at {hertz:,.0f} Hz"
         resonance = resonance_of_line(line_words, hertz, results.modes["frequency"].values, share)
     # a bound has no mark: it is one itself
     doubts = [*([CATALOGUE["W-EXCITATION"].words] if any(map(is_bound, levels)) else []), *marks.words]
@@ -111,7 +109,7 @@ def _origin(order: int, teeth: int) -> str:
     beside = order - harmonic * teeth
     if not harmonic:
         return ""
-    return f"mesh harmonic {harmonic}{f', side band {beside:+d}' if beside else ''}, "
+    return f"mesh harmonic {harmonic}{f', side band {beside:+d}' if beside else ''}"
 
 
 def _nearest_mode(results: Any, hertz: float) -> str:
@@ -122,7 +120,7 @@ def _nearest_mode(results: Any, hertz: float) -> str:
     mode = int(np.abs(frequency - hertz).argmin())
     if 100.0 * abs(frequency[mode] - hertz) > NEAR_RESONANCE * frequency[mode]:
         return ""
-    return f", near mode {mode + 1}: {results.modes['kind'].values[mode]}"
+    return f"near mode {mode + 1}: {results.modes['kind'].values[mode]}"
 
 
 def _resonance(runup: Any) -> str:

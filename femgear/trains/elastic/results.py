@@ -628,7 +628,7 @@ def verdict(results: Results) -> Iterator[Block]:
         if "housing" in stages and "dynamic_factor" in results.housing:
             notes.append("K_v: of the set in the housing that stands still")
         doubts = level_doubts(results, factors.argmax(axis=0).tolist())
-        rows.append(("planet load factor K_gamma", _kinds("{:.3f}", computed["K_gamma"])))
+        rows.append(("planet load factor K_gamma, mean over all positions", _kinds("{:.3f}", computed["K_gamma"])))
         rows += _unequal(results, computed["K_gamma"], notes)
         codes = _all_of(doubts)
         text = _kinds("{:.3f}", computed["K_v"], lambda text: marks(text, *codes, of=_OF_LEVEL))
@@ -637,7 +637,7 @@ def verdict(results: Results) -> Iterator[Block]:
     rated = rating_wanted(results.case)
     if rated and "dynamics" not in stages and "K_gamma" in computed:
         text = _kinds("{:.3f}", computed["K_gamma"])
-        rows.append((f"planet load factor K_gamma{_where(results.static, ', static')}", text))
+        rows.append((f"planet load factor K_gamma, mean over all positions{_where(results.static, ', static')}", text))
     if "K_Hβ" in computed:
         text = _kinds("{:.3f}", computed["K_Hβ"], lambda text: marks(text, "W-FACE-LOAD", "W-THRUST"))
         rows.append(("face load factor K_Hβ", text))
@@ -708,10 +708,12 @@ def _unequal(results: Results, sharing: np.ndarray, notes: list[str]) -> Iterato
         notes.append("at one instant: of the equal share, on the same supports and bearings; K_v contains it")
     shown, mean, held = shares(results.static)
     if not 1.0 / UNEQUAL < shown / most.max() < UNEQUAL:
+        percent = 100.0 * shown / results.static.sizes["planet"]
+        yield f"largest share of a planet at one position, {held}", f"{shown:.3f} of the equal one ({percent:.2f} %)"
         notes.append(
             "K_gamma, K_v: on supports and bearings; static stresses and load shares (static.members): "
-            f"{held}, largest share {mean:.3f} of the equal one, at one instant {shown:.3f}"
-            + (": there the teeth alone take up errors of pins, an upper bound" if held == HELD else "")
+            f"{held}, largest share {mean:.3f} of the equal one as a mean over all positions, {shown:.3f} at one "
+            "position" + (": there the teeth alone take up errors of pins, an upper bound" if held == HELD else "")
         )
 
 
@@ -837,6 +839,8 @@ def _operating_points(results: Results, factors: np.ndarray, doubts: Mapping[int
         for text, name in _HEARD.items():
             if name in limit:
                 columns[text] = lambda i, name=name: marked(f"{float(limit[name][i]):.1f}", i)
+        if "pressure_level" in limit:
+            notes.append("dB(A): sound weighted as the ear hears it; 0 dB is a pressure of 20 µPa, of power 1 pW")
         if limit.attrs.get("method") == "casing" and "pressure_level" in limit:
             notes.append(f"microphone: {_ESTIMATE}")
     ends = sorted({f"{1e-3 * float(end):.4g}" for end in limit["excitation_limit"][[0, -1]]}, key=float)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator
 from typing import Any
 
@@ -31,7 +30,6 @@ from femgear.stages.judgements import (
     resonance_of_line,
     stresses_text,
 )
-from femgear.stages.key_figures import REFERENCE_ACCELERATION
 from femgear.stages.strength import OF_ROOTS
 from femgear.stages.strength_results import SYMBOLS, taken_as_one
 from femgear.trains.gearbox.mode_words import near_mode
@@ -124,7 +122,7 @@ def _motion(results: Any) -> str:
     if "deflection" in results.stages:
         for name, words, factor, unit in (
             ("transmission_error", "transmission error", 1e6, " µm"),
-            ("face_load_factor", "K_Hβ", 1.0, ""),
+            ("face_load_factor", "face load factor K_Hβ", 1.0, ""),
         ):
             values = results.deflection[name].values if name in results.deflection else np.array([np.nan])
             if np.isfinite(values).any():
@@ -132,7 +130,7 @@ def _motion(results: Any) -> str:
     if "dynamics" in results.stages:
         factors = results.dynamics["dynamic_factor"].values
         if np.isfinite(factors).any():
-            parts.append(f"K_v {np.nanmax(factors):.2f}{_longer(results)}")
+            parts.append(f"dynamic factor K_v {np.nanmax(factors):.2f}{_longer(results)}")
     elif "balance" in results.stages:
         mean, largest = (results.balance[name].values for name in ("mean_force", "largest_force"))
         carries = mean > _IDLE * largest.max()
@@ -236,7 +234,5 @@ def _margins(results: Any) -> Iterator[LevelMargin]:
 
 
 def _level(level: float) -> str:
-    """Write a level with its decibels re 1 µm/s²."""
-    if not level > 0.0:
-        return "silence"
-    return f"{level:.3g} m/s² ({20.0 * math.log10(level / REFERENCE_ACCELERATION):.0f} dB re 1 µm/s²)"
+    """Write a level [m/s^2]."""
+    return f"{level:.3g} m/s²" if level > 0.0 else "silence"

@@ -22,7 +22,7 @@ from femgear.trains.gearbox.modes import linear_system
 from femgear.trains.gearbox.sensors import sensor_rows
 from femgear.trains.gearbox.stage_structure import StructuredStage, row_waves
 
-RIGID = "rigidly held parts"
+RIGID = "parts fixed without springs"
 """Path of what the casing holds without springs, such as a ring that stands: the rest of the force on it."""
 
 

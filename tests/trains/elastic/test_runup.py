@@ -223,7 +223,7 @@ def test_the_verdict_states_factors_stresses_and_what_they_assume(case, files, f
     at_3100 = np.argmin(np.abs(found.input_speed / RPM - 3100.0))
     sun, ring = found.heard.dynamic_factor[at_3100]
     assert told["largest dynamic factor K_v, at operating speeds"] == f"sun-planet {sun:.3f}, planet-ring {ring:.3f}"
-    assert told["planet load factor K_gamma"] == "sun-planet 1.000, planet-ring 1.000"
+    assert told["planet load factor K_gamma, mean over all positions"] == "sun-planet 1.000, planet-ring 1.000"
     nominal = files["stress"]["iso_root_stress"].values[0, 1]
     safety = 2 * 0.7 * 430e6 / (nominal * sun)
     assert f"planet, sun side {safety:.2f}" in told["safety S_F, ISO 6336-3:2019"]
@@ -271,16 +271,19 @@ def test_the_verdict_says_what_shares_belong_to(case, files):
     unequal = files["static"].assign(load_share=share, largest_load_share=share.max("position"))
     one_off = files | {"static": unequal}
     rows, notes = told_of(case, one_off)
-    assert {"largest root stress, all centres held", "transmission error, peak to peak, all centres held"} < {*rows}
+    assert {"largest root stress, gear axes fixed", "transmission error, peak to peak, gear axes fixed"} < {*rows}
     assert "largest root stress, static" in told_of(case, files)[0]
-    assert "on supports and bearings; static stresses and load shares (static.members): all centres held" in notes
-    assert "largest share 1.500 of the equal one, at one instant 1.500: there the teeth alone" in notes
+    assert "on supports and bearings; static stresses and load shares (static.members): gear axes fixed" in notes
+    assert (
+        "largest share 1.500 of the equal one as a mean over all positions, 1.500 at one position: there the" in notes
+    )
+    assert rows["largest share of a planet at one position, gear axes fixed"] == "1.500 of the equal one (50.00 %)"
     assert notes.count("K_gamma = ") == 0
     force = files["modes"]["supported_force"].values.copy()
     force[0, :5] *= 1.9
     turning = files | {"modes": files["modes"].assign(supported_force=(("mesh", "supported_position"), force))}
     rows = told_of(case, turning)[0]
-    assert rows["planet load factor K_gamma"] == "sun-planet 1.000, planet-ring 1.000"
+    assert rows["planet load factor K_gamma, mean over all positions"] == "sun-planet 1.000, planet-ring 1.000"
     # 1.9 of 1.9 + 1 + 1
     most = 3 * 1.9 / 3.9
     assert rows["largest share at one instant, at rest"] == f"sun-planet {most:.3f}, planet-ring 1.000"
