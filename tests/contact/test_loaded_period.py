@@ -75,6 +75,32 @@ def test_record_is_the_walk_at_its_positions(solved, bodies):
         assert getattr(found, name)[:, some] == pytest.approx(expected, rel=2e-5)
 
 
+def test_five_planets_that_come_after_the_next_but_one_have_the_states_of_a_walk(coarse):
+    """Sun of 22 teeth, 4.4 a planet: planet 4 is where planet 1 was after a fifth of the period, not planet 2.
+
+    The mean compliance is that of straight lines between the positions.
+    """
+    common = dict(profile_shift=0.0, module=2e-3, pressure_angle=np.deg2rad(20), face_width=0.02)
+    gears = close_set(
+        Gear(teeth=22, rim_radius=0.008, **common),
+        Gear(teeth=18, rim_radius=0.009, **common),
+        Gear(teeth=58, rim_radius=0.075, internal=True, **common),
+        planet_angles=equal_planet_angles(5),
+        centre_distance=0.0401,
+        find=("sun", "ring"),
+    )
+    bodies = make_bodies(make_sectors(gears, STEEL, flank_elements=6), STEEL)
+    found = loaded_period(gears, bodies, bodies, sun_torque=TORQUE, positions=5, supports=SUPPORTS)
+    options = dict(supports=SUPPORTS, options=CycleOptions(held_bodies=bodies))
+    walk = walk_mesh_cycle(gears, bodies, sun_torque=TORQUE, positions=found.position, **options)
+    for name in ("force", "deflection", "stiffness"):
+        expected = getattr(walk, name)
+        assert np.abs(getattr(found, name) - expected).max() < 1e-9 * np.abs(expected).max()
+    closed = np.concatenate([walk.held_compliance, walk.held_compliance[..., :1]], axis=-1)
+    mean = np.trapezoid(closed, np.append(found.position, 1.0))
+    assert found.held_compliance == pytest.approx(mean, abs=1e-9 * mean.max())
+
+
 def test_every_jump_of_the_stiffness_is_enclosed(solved):
     """No interval wider than the shortest holds more than the change that is allowed between neighbours."""
     _, found = solved

@@ -8,7 +8,7 @@ from random_sets import random_set
 from femgear.case.dependencies import Steps
 from femgear.contact.bodies import make_bodies, make_sectors
 from femgear.contact.cycle import CycleOptions, walk_mesh_cycle
-from femgear.contact.peaks import TOLERANCE, open_places, peak_doubt, tooth_pair_codes
+from femgear.contact.peaks import TOLERANCE, open_places, peak_doubt, pitch_passages, tooth_pair_codes
 from femgear.stages.static import solve_static, solve_stress
 from femgear.study.objectives import transmission_error
 from femgear.study.relief import design_basis, harris_map, sun_torque, with_tip_relief
@@ -114,6 +114,13 @@ def test_codes_tell_which_pairs_carry():
     assert tooth_pair_codes(path, np.ones((1, 2, 3)), np.array([0.1, 0.2, 0.3]), 1.0).min() == codes[1]
 
 
+def test_pairs_that_have_passed_the_pitch_point_are_counted_from_the_first_path():
+    """Pairs 0.4 pitches before it and 0.6 behind it: the first one passes 0.4 mesh periods later."""
+    position = np.array([0.0, 0.3, 0.5, 1.5])
+    path = 2e-3 * (np.array([[-0.4], [0.6]]) + position)[None]
+    assert pitch_passages(path, position, 2e-3).tolist() == [[0, 0, 1, 2]]
+
+
 @pytest.fixture(scope="module")
 def reference():
     gears = reference_set()
@@ -149,6 +156,18 @@ def test_equal_planets_in_phase(reference, count, torque):
     assert apart < 0.02 and share < 1e-9 and few.between.doubt < 0.03
     assert len(few.position) == count and (np.diff(few.between.position) > 0.0).all()
     assert ((few.between.position >= 0.0) & (few.between.position < 1.0)).all()
+
+
+def test_rounds_of_halving_are_counted_and_their_places_mirrored_with_the_torque(reference, monkeypatch):
+    """Quarters of a record of four positions, and one round: the state at -x is the image of that at x."""
+    monkeypatch.setattr("femgear.contact.cycle.MOST_ROUNDS", 1)
+    gears, bodies = reference
+    between, image = (
+        walk_mesh_cycle(gears, bodies, sun_torque=torque, positions=4, options=PEAKS).between
+        for torque in (TORQUE, -TORQUE)
+    )
+    assert len(between.records) == len(image.records) == 2
+    assert image.position == pytest.approx(1.0 - between.position[::-1], abs=1e-12)
 
 
 @pytest.mark.parametrize(
