@@ -515,6 +515,12 @@ CATALOGUE = {
         "thin tips",
         "Take a smaller profile shift or tip diameter: hardened tips may break off.",
     ),
+    "W-TONE": Meaning(
+        NOTE,
+        "A recording has tones of constant frequency, such as the hum of the mains, while the speed changes.",
+        "hum in the recording",
+        "Look for hum of the mains and for other machines; lines of the set are what is left.",
+    ),
     "W-TORQUE": Meaning(
         NOTE,
         "The torque has an unusual sign or size.",

@@ -71,10 +71,12 @@ def recording(
     wander: float = 0.01,
     noise: float = 1e-3,
     seed: int = 1,
+    logic: bool = True,
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Signal (n,), pulses of the sun (n,) and turns of the carrier (n,) at a speed [1/s] that wanders by a share.
 
-    The noise is a share of the largest line.
+    The noise is a share of the largest line. Pulses have a logic level, which jumps within a sample, or are those of a
+    sensor, which rise over many.
     """
     time = np.arange(round(seconds * rate)) / rate
     # the speed is carrier (1 + wander sin(2 pi f t)), f = 0.23 Hz
@@ -84,7 +86,7 @@ def recording(
         signal += np.real(amplitude * np.exp(2j * np.pi * at * turns))
     signal += noise * np.abs(list(value)).max() * np.random.default_rng(seed).normal(size=len(time))
     sun = 5.0 * turns  # 1 + 108/27 turns in one of the carrier
-    pulses = 5.0 * (np.mod(sun, 1.0) < 0.1)
+    pulses = 5.0 * (np.mod(sun, 1.0) < 0.1) if logic else 5.0 * np.exp((np.cos(2.0 * np.pi * sun) - 1.0) / 0.1)
     return signal, pulses, turns
 
 
@@ -127,13 +129,15 @@ def _write_universal(path: Path, channels: Mapping[str, np.ndarray], rate: float
         pyuff.UFF(str(path)).write_sets(pyuff.prepare_58(**data, **scalar, **times), mode="add")
 
 
-def read_back(kind: str, *, noise: float = 1e-3, rate: float = PULSE_RATE) -> tuple[MeasuredVerdict, np.ndarray]:
+def read_back(
+    kind: str, *, noise: float = 1e-3, rate: float = PULSE_RATE, logic: bool = True
+) -> tuple[MeasuredVerdict, np.ndarray]:
     """Record a set, read the file and find its lines; of each the error of order, of level [dB], and what is stated."""
     order, value = computed_lines(kind)
     loud = np.abs(value) > _LEFT_OUT * np.abs(value).max()
     order, value = order[loud], value[loud]
     # 120 turns: lines of a planet's tooth lie a tenth of an order apart, twelve bins
-    signal, pulses, _ = recording(order, value, seconds=40.0, noise=noise, rate=rate)
+    signal, pulses, _ = recording(order, value, seconds=40.0, noise=noise, rate=rate, logic=logic)
     form = FORMATS[kind]
     with tempfile.TemporaryDirectory() as folder:
         path = written(Path(folder), form, signal, pulses, rate)

@@ -32,6 +32,7 @@ class Progress:
 
         self._console = Console(stderr=True, markup=False, highlight=False)
         self._done, self._now, self._start = dict[str, tuple[float, float]](), "", time.monotonic()
+        self._first = dict[str, tuple[float, float]]()
         self._ended, self._bars, self._tasks = threading.Event(), None, {}
         if self._console.is_terminal:
             self._draw_bars()
@@ -48,6 +49,7 @@ class Progress:
         """Say that ``done`` of ``total`` steps of a stage are done."""
         if stage not in self._done and self._bars is None:
             self._console.print(stage)
+        self._first.setdefault(stage, (time.monotonic(), done))
         self._done[stage], self._now = (done, total), stage
         if self._bars is not None:
             if stage not in self._tasks:
@@ -82,9 +84,18 @@ class Progress:
     def _tell_time(self) -> None:
         """Print how far the stage has come as often as a reader would begin to wonder."""
         while not self._ended.wait(SILENCE):
-            done, total = self._done.get(self._now, (0.0, 1.0))
-            share = f", {done:.5g} of {total:.5g}" if total > 1.0 else ""
-            self._console.print(f"{self._now or 'working'}{share}, {time.monotonic() - self._start:.0f} s")
+            self._console.print(self._time_words())
+
+    def _time_words(self) -> str:
+        """Say what the stage is, how far it has come, how long the command runs, and how long the stage will."""
+        now, (done, total) = time.monotonic(), self._done.get(self._now, (0.0, 1.0))
+        share = f", {done:.5g} of {total:.5g}" if total > 1.0 else ""
+        text = f"{self._now or 'working'}{share}, {now - self._start:.0f} s"
+        begun, at_first = self._first.get(self._now, (self._start, 0.0))
+        # what was done before the first call, of a command that goes on, tells nothing of the pace
+        if total > done > at_first and total > 1.0:
+            text += f", about {(now - begun) * (total - done) / (done - at_first):.0f} s left"
+        return text
 
 
 def print_blocks(blocks) -> None:

@@ -68,7 +68,7 @@ def different_positions(
     apart = np.rint(np.where(near, shift, 0.0) / _SAME_SEPARATION).astype(np.int64)
     states = [places[:, None], np.moveaxis(apart, 1, 0).reshape(len(tau), -1)]
     for fault in (fault for fault in deviations.faults if fault.tooth is not None):
-        faulty = _on_faulty_tooth(gears, fault, setup.listed.tooth, turns)
+        faulty = on_faulty_tooth(gears, fault, setup.listed.tooth, turns)
         states.append(np.moveaxis(faulty & near, 1, 0).reshape(len(tau), -1).astype(np.int64))
     _, first, again = np.unique(np.hstack(states), axis=0, return_index=True, return_inverse=True)
     order = np.argsort(first)
@@ -97,10 +97,11 @@ def _may_touch(
     return near
 
 
-def _on_faulty_tooth(gears: GearSet, fault: ToothFault, tooth: np.ndarray, turns: np.ndarray) -> np.ndarray:
+def on_faulty_tooth(gears: GearSet, fault: ToothFault, tooth: np.ndarray, turns: np.ndarray) -> np.ndarray:
     """Tell of every pair (M, P, T) whether it is one of the faulty flank.
 
-    Of teeth (2, M, T) in the first mesh period. Pairs of the other flank have no fault that takes material off.
+    Of teeth (2, M, T) in the first mesh period, and the mesh periods passed (P,). Pairs of the other flank have no
+    fault that takes material off.
     """
     meshes, (periods, pairs) = tooth.shape[1], (len(turns), tooth.shape[2])
     faulty = np.zeros((meshes, periods, pairs), bool)

@@ -61,9 +61,14 @@ class Channel:
         """Times of the samples [s], shape (n,)."""
         return self.start + np.arange(len(self.values)) / self.rate
 
+    @property
+    def words(self) -> str:
+        """The channel in a sentence: ``"channel acc"``; one without a name of its own has the word in it."""
+        return self.name if self.name.startswith("channel ") else f"channel {self.name}"
+
     def problem(self, message: str, **words) -> CaseError:
         """Make a refusal (E-FILE) that names the file and the channel."""
-        return file_problem(f"{self.file}, channel {self.name}", message, **words)
+        return file_problem(f"{self.file}, {self.words}", message, **words)
 
 
 def file_problem(file: str, message: str, *, remedy: str, value=None, limit: str | None = None) -> CaseError:
@@ -161,7 +166,7 @@ def cut_channel(channel: Channel, begin: float | None, end: float | None) -> Cha
     if not len(values):
         last = channel.start + channel.duration
         raise CaseError(
-            f"no samples of channel {channel.name} between two times",
+            f"no samples of {channel.words} between two times",
             code="E-RANGE",
             key="--end" if begin is None else "--begin",
             file=channel.file,

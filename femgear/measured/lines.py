@@ -46,9 +46,9 @@ VERDICTS = (NORMAL, UNEQUAL, "error or fault of the sun", "error or fault of a p
 class MeasuredLine:
     """One line of a measured spectrum.
 
-    ``order`` of the carrier, ``amplitude`` (peak) in the unit of the signal, ``level`` [dB] over the strongest line,
-    ``verdict`` one of `VERDICTS`, ``place`` what `classify_lines` says of its place. ``uncertainty`` is by how much
-    the amplitude may be wrong [dB], see `level_uncertainty`.
+    ``order`` of the carrier, ``amplitude`` (peak) in the unit of the signal, ``level`` [dB] over the strongest line
+    that the set can make, ``verdict`` one of `VERDICTS`, ``place`` what `classify_lines` says of its place.
+    ``uncertainty`` is by how much the amplitude may be wrong [dB], see `level_uncertainty`.
     """
 
     order: float
@@ -166,10 +166,11 @@ def judge_lines(
     tolerance : float
         Distance of orders that count as one.
     """
-    largest = amplitude.max(initial=0.0)
     lines, orders = [], np.asarray(order, float).tolist()
     places = classify_lines(orders, planet_angles, teeth, tolerance=tolerance)
     heights = np.asarray(amplitude, float).tolist()
+    possible = [height for height, place in zip(heights, places, strict=True) if place.verdict != FOREIGN]
+    largest = max(possible or heights, default=0.0)
     for line_order, height, place, wrong in zip(orders, heights, places, uncertainty.tolist(), strict=True):
         level = 20 * float(np.log10(height / largest))
         lines.append(MeasuredLine(line_order, height, level, _words(place), place, wrong))

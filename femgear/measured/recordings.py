@@ -18,13 +18,8 @@ from femgear.measured.csv_signals import read_csv_signals
 from femgear.measured.heard_set import HeardSet
 from femgear.measured.requests import Recording
 from femgear.measured.sampled_files import read_matlab_signals, read_wav_signals
-from femgear.measured.turns import (
-    AngleSignal,
-    Turns,
-    constant_turns,
-    resample_turns,
-    turns_of_pulses,
-)
+from femgear.measured.tones import Tone, without_tones
+from femgear.measured.turns import AngleSignal, Turns, constant_turns, turns_of_pulses
 from femgear.measured.universal_functions import read_universal_signals
 
 _READERS = {".wav": read_wav_signals, ".mat": read_matlab_signals}
@@ -34,6 +29,8 @@ _OFF = 0.05
 """Distance of the mesh order from where lines stand best, in orders, from which a constant speed is doubted."""
 _FALSE, _HARMONICS_LOOKED_AT = -30.0, 3
 """Level of false lines over the one beside them that is told [dB], and mesh harmonics up to which it is."""
+_TONES_SAID = 6
+"""Tones of constant frequency that are named."""
 _ACCELERATIONS = {"m/s^2": 1.0, "m/s2": 1.0, "mm/s^2": 1e-3, "g": 9.80665, "mg": 9.80665e-3}
 """Accelerations [m/s^2] by their units, in which g is that of free fall (ISO 80000-3)."""
 
@@ -95,7 +92,9 @@ def read_by_turns(path: str | os.PathLike, recording: Recording, shafts: HeardSe
     signal = channel_in_si(signal, recording.unit)
     if turns is None:
         turns = constant_turns(signal, _carrier_speed(signal, recording, shafts))
-    return resample_turns(signal, turns, parts=shafts.ring)
+    signal, tones = without_tones(signal, turns, parts=shafts.ring)
+    _tell_tones(tones, signal.unit)
+    return signal
 
 
 def channel_in_si(signal: Channel, unit: str | None) -> Channel:
@@ -149,6 +148,20 @@ def _tell_coarse_pulses(turns: Turns, shafts: HeardSet) -> None:
         words += f" beside it, within {-_FALSE:g} dB"
         remedy = "sample the pulses faster, take more of them a turn, or record the sensor instead of a logic level"
         tell(Finding("W-RATE", "--pulses", words, remedy=remedy))
+
+
+def _tell_tones(tones: Sequence[Tone], unit: str) -> None:
+    """Say which tones of constant frequency are taken off."""
+    if not tones:
+        return
+    names = [
+        f"{tone.frequency:.6g} Hz{f' ± {tone.width:.2g} Hz' if tone.width else ''} ({tone.amplitude:.3g}"
+        f"{f' {unit}' if unit else ''})"
+        for tone in tones
+    ]
+    words = f"tones of constant frequency, which no turning part makes, are taken off: {', '.join(names[:_TONES_SAID])}"
+    words += f" and {len(names) - _TONES_SAID} more" if len(names) > _TONES_SAID else ""
+    tell(Finding("W-TONE", "--channel", words))
 
 
 def _carrier_speed(signal: Channel, recording: Recording, shafts: HeardSet) -> float:

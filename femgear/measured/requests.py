@@ -29,7 +29,8 @@ class Recording:
     unit
         Acceleration that a one in the file stands for, as "1 g" or "98.1 m/s^2". Default: the unit that the file names.
     within
-        Share of that speed within which the one is searched at which the lines stand best on orders of the set.
+        How far the true speed may be from ``speed``, over it: 0.003 is 0.3 %. The speed is taken at which the lines fit
+        the orders of the set best.
     begin
         Time of the file from which on samples are taken [s]. Default: its first.
     end
@@ -55,7 +56,7 @@ class LineSearch:
     Parameters
     ----------
     threshold
-        Level over the strongest line from which on lines are looked at [dB].
+        Level over the strongest line that the set can make, from which on lines are looked at [dB].
     tolerance
         Distance of orders that count as one. Default: half the step of the spectrum, 0.02 or more.
     """

@@ -213,15 +213,15 @@ def constant_turns(channel: Channel, speed: float) -> Turns:
     return Turns(time, (time - time[0]) * speed)
 
 
-def resample_turns(channel: Channel, turns: Turns, *, parts: int = 1) -> AngleSignal:
-    """Sample a signal anew at equal steps of the angle of a shaft, over all whole turns of both records.
+def even_angle_times(channel: Channel, turns: Turns, *, parts: int = 1) -> tuple[np.ndarray, int, float]:
+    """Find times (n,) [s] at equal steps of the angle of a shaft, over all whole turns of both records.
 
     The steps are so fine that no sample of the recording is skipped at the slowest speed, and each of so many ``parts``
-    of a turn has a whole number of them. CaseError: E-FILE: fewer
-    than four whole turns, a record of pulses that ends long before the signal; E-MEMORY: too many samples.
-    """
-    from scipy.ndimage import map_coordinates
+    of a turn has a whole number of them. Returns the times, the number of whole turns, and the largest speed [1/s].
 
+    CaseError: E-FILE: fewer than four whole turns, a record of pulses that ends long before the signal; E-MEMORY: too
+    many samples.
+    """
     end = channel.start + (len(channel.values) - 1) / channel.rate
     inside = (turns.time >= channel.start) & (turns.time <= end)
     covered = (turns.time[inside][-1] - turns.time[inside][0]) / (end - channel.start) if inside.sum() > 1 else 0.0
@@ -255,7 +255,15 @@ def resample_turns(channel: Channel, turns: Turns, *, parts: int = 1) -> AngleSi
             "use more pulses a turn, or a part of the record by --begin and --end",
         )
         raise channel.problem(message, value=f"{slowest * 60:.4g} to {fastest * 60:.4g} rpm", remedy=remedy)
+    return times, whole, fastest
+
+
+def resample_turns(channel: Channel, turns: Turns, *, parts: int = 1) -> AngleSignal:
+    """Sample a signal anew at the times of `even_angle_times`, which says what is refused."""
+    from scipy.ndimage import map_coordinates
+
+    times, whole, fastest = even_angle_times(channel, turns, parts=parts)
     values = map_coordinates(channel.values, [(times - channel.start) * channel.rate], order=5, mode="mirror")
     highest, mean = _HIGHEST * channel.rate / fastest, whole / (times[-1] - times[0])
     figures = float(highest), float(mean), turns.error
-    return AngleSignal(channel.name, channel.unit, values, whole, per_turn, *figures)
+    return AngleSignal(channel.name, channel.unit, values, whole, len(values) // whole, *figures)

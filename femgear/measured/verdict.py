@@ -52,6 +52,8 @@ if TYPE_CHECKING:
 _SHOWN = 40
 """Lines of the printed table."""
 _LINES, _SPECTRUM, _FIGURE = "lines.csv", "order_spectrum.csv", "lines.png"
+_DEEPER = (0.0, -20.0, -40.0, -60.0, -80.0)
+"""Levels by which lines from elsewhere may be stronger than all of the set [dB]."""
 _HALF_WIDTH = 12
 _HARMONICS = 3
 
@@ -92,12 +94,29 @@ def measured_verdict(
     signal = read_by_turns(path, recording, gear_set)
     tolerance = order_tolerance(signal.turns, search.tolerance)
     spectrum = windowed_spectrum(signal)
-    order, height = sharpened_lines(spectrum, search.threshold)
-    wrong = level_uncertainty(spectrum, order, height, time_error=signal.time_error, speed=signal.speed)
+    lines = _judged_lines(spectrum, signal, search.threshold, gear_set, tolerance)
+    order, height = np.array([(line.order, line.amplitude) for line in lines]).reshape(-1, 2).T
     highest = float(spectrum.order[-1])
     _tell_wrong_turns(lines_near_mesh(gear_set, order, height, tolerance, highest), recording, highest)
-    lines = judge_lines(order, height, wrong, gear_set.angles, gear_set.teeth, tolerance)
     return MeasuredVerdict(gear_set, signal, spectrum, lines, tolerance)
+
+
+def _judged_lines(
+    spectrum: OrderSpectrum, signal: AngleSignal, threshold: float, gear_set: HeardSet, tolerance: float
+) -> tuple[MeasuredLine, ...]:
+    """Judge lines from a threshold [dB] on, which counts from the strongest line that the set can make.
+
+    A strong line from elsewhere would else hide those of the set. Where none is found, it counts from the strongest.
+    """
+    judged = []
+    for deeper in _DEEPER:
+        order, height = sharpened_lines(spectrum, threshold + deeper)
+        wrong = level_uncertainty(spectrum, order, height, time_error=signal.time_error, speed=signal.speed)
+        judged.append(judge_lines(order, height, wrong, gear_set.angles, gear_set.teeth, tolerance))
+        above = max((line.level for line in judged[-1]), default=0.0)
+        if above <= -deeper and any(line.verdict != VERDICTS[-1] for line in judged[-1]):
+            return tuple(line for line in judged[-1] if line.level >= threshold)
+    return judged[0]
 
 
 def _tell_wrong_turns(mesh: MeshLines, recording: Recording, highest: float) -> None:
@@ -193,6 +212,9 @@ def describe_verdict(verdict: MeasuredVerdict, search: LineSearch) -> Iterator[B
 
 
 def _notes(verdict: MeasuredVerdict) -> Iterator[str]:
+    above = max((line.level for line in verdict.lines), default=0.0)
+    if above > 0.0:
+        yield f"levels are over the strongest line that the set can make; one from elsewhere is {above:.1f} dB above it"
     counts = {word: [line for line in verdict.lines if line.verdict == word] for word in VERDICTS}
     yield ", ".join(f"{len(lines)} {word}" for word, lines in counts.items() if lines) or "no line stands out"
     for word, lines in list(counts.items())[1:]:

@@ -75,8 +75,10 @@ def describe_fault_orders(case: Any, speed: float | None = None) -> Iterator[Blo
         seen = NEW if makes_new_lines(gears, name) else UNSEEN
         rows.append((f"a tooth of the {name}", meets[name], meets[name] / carrier, text, seen))
     table = tuple((name, f"{hertz:.6g}", f"{order:.6g}", text, seen) for name, hertz, order, text, seen in rows)
+    equal = g == gears.n_planets
+    often = "" if equal else ", as often as this on average: the planets do not stand at equal angles"
     notes = (
-        "a tooth of sun or ring meets any of the planets, one of a planet meets the sun; q and m are whole numbers",
-        "orders: of the carrier, as a sensor beside the ring hears them, with equal planets",
+        f"a tooth of sun or ring meets any of the planets{often}; one of a planet meets the sun",
+        "orders: of the carrier, as a sensor beside the ring hears them, with planets alike; q and m are whole numbers",
     )
     yield Block("Orders of faults", ("what", "frequency [Hz]", "order", "lines at orders", "shows by"), table, notes)

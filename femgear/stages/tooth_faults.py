@@ -12,7 +12,9 @@ import numpy as np
 from femgear.case.fault_sections import FaultSection, keyed_faults
 from femgear.case.gear_set import planetary_set, set_deviations
 from femgear.contact.flank_pairs import RIGHT, acting_flanks
-from femgear.findings import Finding
+from femgear.contact.repeated_positions import on_faulty_tooth
+from femgear.contact.windows import pair_paths
+from femgear.findings import FAULT, Finding
 from femgear.gears.deviations import rotational_symmetry
 from femgear.gears.faults import BrokenTip, Crack, MissingTooth, Spall, ToothFault
 from femgear.gears.pair import BRANCH
@@ -50,6 +52,24 @@ def fault_findings(case: Any) -> Iterator[Finding]:
             yield Finding("W-FAULT", key, text, remedy="give the fault to the other flank, or turn the torque round")
     yield from _unseen(case, gears)
     yield from _in_whole_slices(case, gears)
+    yield from _out_of_mesh(case, gears)
+
+
+def _out_of_mesh(case: Any, gears: GearSet) -> Iterator[Finding]:
+    """Teeth so many of which are missing that at times no planet has teeth in all its meshes."""
+    missing = [fault for fault in set_deviations(case).faults if isinstance(fault, MissingTooth)]
+    for number in sorted({fault.gear for fault in missing}):
+        gear, faults = gears.gears[number], [fault for fault in missing if fault.gear == number]
+        turns = np.arange(gear.teeth)
+        _, tooth = pair_paths(gears, np.zeros(1), both_flanks=False)
+        left = ~np.any([on_faulty_tooth(gears, fault, tooth, turns) for fault in faults], axis=0)
+        meshes = left.any(axis=2)
+        carried = np.all([meshes[rows] for rows in gears.kind_rows], axis=0).any(axis=0)
+        if not carried.all():
+            share = f"{(~carried).mean():.0%} of the mesh periods"
+            text = f"{len(faults)} missing teeth: in {share} nothing carries the torque"
+            remedy = "leave teeth that mesh in turn with one planet or another"
+            yield Finding("W-FAULT", f"{gear.name}.fault", text, severity=FAULT, remedy=remedy)
 
 
 def _in_whole_slices(case: Any, gears: GearSet) -> Iterator[Finding]:
@@ -69,12 +89,19 @@ def _in_whole_slices(case: Any, gears: GearSet) -> Iterator[Finding]:
 
 def left_out_of_faults(case: Any) -> Iterator[Finding]:
     """List what the model leaves out of the faults of a case."""
+    kinds: dict[type, list[str]] = {}
     for key, fault in keyed_faults(case, planetary_set(case)):
-        if (text := _LEFT_OUT.get(type(fault))) is not None:
-            yield Finding("W-FAULT", key, text, remedy="take sizes with that margin; orders and places are exact")
-        if isinstance(fault, Spall | BrokenTip):
-            text = "the flank has a sharp edge, where pressure has no limit: the largest one is that of the grid"
-            yield Finding("W-EDGE", key, text, remedy="look at pressures away from the faulty tooth")
+        kinds.setdefault(type(fault), []).append(key)
+    for kind, keys in kinds.items():
+        several = f"{len(keys)} faults, up to {keys[-1]}: " if len(keys) > 1 else ""
+        if kind in _LEFT_OUT:
+            text, remedy = several + _LEFT_OUT[kind], "take sizes with that margin; orders and places are exact"
+            yield Finding("W-FAULT", keys[0], text, remedy=remedy)
+        if kind in (Spall, BrokenTip):
+            text = (
+                f"{several}the flank has a sharp edge, where pressure has no limit: the largest one is that of the grid"
+            )
+            yield Finding("W-EDGE", keys[0], text, remedy="look at pressures away from the faulty tooth")
 
 
 def _carrying(gears: GearSet, fault: ToothFault, *, back: bool) -> set[int]:

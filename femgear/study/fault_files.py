@@ -26,6 +26,7 @@ from femgear.study.fault_records import (
     MachineRecords,
     fault_plan,
     longest_first,
+    machine_times,
     record_case,
     solve_machine,
 )
@@ -67,13 +68,16 @@ def fault_records_into(
         return [], _write_alone(plan, folder, further.index, further)
     machines = range(-(-request.count // plan.each))
     with resumable(folder):
-        left = longest_first(plan, (machine for machine in machines if not _is_there(plan, folder / _name(machine))))
+        times = machine_times(plan, machines)
+        left = [machine for machine in longest_first(times) if not _is_there(plan, folder / _name(machine))]
+        what, done = f"{len(machines)} machines, share of the work [%]", sum(times.values()) - sum(map(times.get, left))
         outcomes = (runner or Runner()).map(partial(solve_machine, plan), left)
-        for done, (index, outcome) in enumerate(outcomes, len(machines) - len(left) + 1):
+        for index, outcome in outcomes:
             if isinstance(outcome, FemgearError):
                 raise outcome
             write_dataset(machine_contents(plan, outcome), folder / _name(left[index]))
-            progress("machines", done, len(machines))
+            done += times[left[index]]
+            progress(what, round(100.0 * done / sum(times.values())), 100.0)
         rows = [row for row in _labels(plan, folder, machines) if row[0] < request.count]
         write_csv(folder / _LABELS, _HEADER, rows)
         names = [_LABELS, *map(_name, machines)]

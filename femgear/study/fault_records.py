@@ -242,16 +242,20 @@ def _drawn_machine(plan: FaultPlan, machine: int) -> tuple[FaultPlace, float]:
     return drawn_fault(kind, planetary_set(plan.case), plan.gears, plan.sizes, shares, back=back), float(torque)
 
 
-def longest_first(plan: FaultPlan, machines: Iterable[int]) -> list[int]:
-    """Sort machines by how long they take, roughly: a long one that is begun last would leave other workers idle."""
-    gears = planetary_set(plan.case)
-
-    def work(machine: int) -> float:
+def machine_times(plan: FaultPlan, machines: Iterable[int]) -> dict[int, float]:
+    """Estimate how long machines take, roughly, in seconds of the reference set."""
+    gears, times = planetary_set(plan.case), dict[int, float]()
+    for machine in machines:
         fault, _ = _drawn_machine(plan, machine)
         # all mesh periods of a cracked gear are solved
-        return _WORK.get(fault.kind, 1.0) * (getattr(gears, fault.gear).teeth if fault.kind == "crack" else 1.0)
+        teeth = getattr(gears, fault.gear).teeth if fault.kind == "crack" else 1.0
+        times[machine] = _WORK.get(fault.kind, 1.0) * teeth
+    return times
 
-    return sorted(machines, key=work, reverse=True)
+
+def longest_first(times: Mapping[int, float]) -> list[int]:
+    """Sort machines by their times [s]: a long one that is begun last would leave other workers idle."""
+    return sorted(times, key=times.__getitem__, reverse=True)
 
 
 def machine_case(plan: FaultPlan, machine: int) -> tuple[Any, FaultPlace, np.ndarray]:

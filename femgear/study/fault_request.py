@@ -12,9 +12,10 @@ class FaultRequest:
     Parameters
     ----------
     kinds
-        healthy, crack, spall, missing, broken corner, wear; separated by commas. Machines have them in turn.
+        Kinds of machines, separated by commas: healthy, crack, spall, missing, broken corner, wear. Each machine takes
+        the next one. Default: all.
     gears
-        sun, planet, ring; separated by commas.
+        Gears that have the faults, separated by commas: sun, planet, ring. Default: all.
     sizes
         As "crack=0.5 mm..2 mm,wear=2 um..20 um": depth of cracks and wear, length of spalls and broken corners.
         Default: some parts of the module.
@@ -25,17 +26,17 @@ class FaultRequest:
     count
         Number of records.
     each
-        Records of a machine, at as many speeds.
+        Records of each machine, every one at a speed of its own.
     seed
-        Record i of a seed is the same whatever the number of records.
+        Seed of all that is drawn. Record i of a seed is the same, however many there are.
     noise
-        White noise over the signal, as "-30 dB"; or none.
+        White noise, by its root mean square over that of the signal, as "-30 dB"; or none.
     duration
-        Of a record.
+        Length of a record.
     rate
         Samples a second [Hz].
     up_to
-        End of the excitation. Default: that of the case, else 5 kHz.
+        Highest frequency of the mesh forces. Default: that of the case, else 5 kHz.
     """
 
     kinds: tuple[str, ...] = ()
@@ -65,8 +66,8 @@ class FurtherRecords:
     index
         Compute this record alone: record_INDEX.nc, the same to the last bit, and its case record_INDEX.toml.
     limits
-        In place of records: from which size on faults stand out of healthy sets, by so many sizes of every kind;
-        limits.csv and limits.png.
+        Find from which size on faults stand out of healthy sets, with so many sizes of every kind. limits.csv and
+        limits.png are written, and no records.
     """
 
     wav: bool = False

@@ -88,6 +88,19 @@ def test_progress_is_never_silent_for_long_in_a_file(monkeypatch, capsys):
     lines = capsys.readouterr().err.splitlines()
     assert lines[0] == "pictures" and len(lines) > 2
     assert all(line.startswith("pictures, 3 of 11, ") and line.endswith(" s") for line in lines[1:])
+    assert not any("left" in line for line in lines)
+
+
+def test_progress_in_a_file_says_how_long_it_will_take(monkeypatch, capsys):
+    """From the pace since the first step of the stage that was seen: a command may go on where another was stopped."""
+    monkeypatch.setattr(terminal, "SILENCE", 3600.0)
+    now = 1000.0
+    monkeypatch.setattr(terminal.time, "monotonic", lambda: now)
+    with terminal.Progress() as progress:
+        progress("machines", 10, 50)
+        now += 60.0
+        progress("machines", 20, 50)
+        assert progress._time_words() == "machines, 20 of 50, 60 s, about 180 s left"
 
 
 def test_progress_before_the_first_stage_has_a_name(monkeypatch, capsys):

@@ -87,7 +87,8 @@ def test_silence_has_no_lines(tmp_path):
 def test_computed_signals_with_noise_and_a_wandering_speed_come_back(kind):
     """Orders within 0.01, levels within 0.2 dB where the noise beside them allows, else within what is stated."""
     assert {row.verdict for row in come_back((kind,))} == {"passes"}
-    found, _ = read_back(kind)
+    # logic levels tell the angle too coarsely for the weakest lines beside loud ones (W-RATE); a sensor does not
+    found, _ = read_back(kind, logic=False)
     (order, value), verdicts = computed_lines(kind), {line.verdict for line in found.lines}
     # all that lie half a decibel above the threshold are there
     loud = order[np.abs(value) > 10 ** (-34.5 / 20) * np.abs(value).max()]

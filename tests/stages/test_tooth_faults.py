@@ -52,6 +52,16 @@ def test_a_whole_set_has_nothing_to_say(healthy):
     assert texts(healthy) == []
 
 
+@pytest.mark.parametrize(("teeth", "nothing_left"), [(range(26), True), (range(0, 27, 2), False), ((3,), False)])
+def test_teeth_that_leave_nothing_in_mesh_are_a_fault_before_anything_is_solved(healthy, teeth, nothing_left):
+    case = with_values(healthy, {"sun.fault": [{"kind": "missing", "tooth": tooth} for tooth in teeth]})
+    open_meshes = [finding for finding in fault_findings(case) if finding.severity == "fault"]
+    assert len(open_meshes) == nothing_left
+    assert all("26 missing teeth: in" in finding.text for finding in open_meshes)
+    # what the model leaves out is said once, not 26 times
+    assert len([finding for finding in fault_findings(case) if "compliance" in finding.text]) == 1
+
+
 def test_faults_say_what_is_left_out(healthy):
     spall = {"kind": "spall", "tooth": 3, "flank": "left", "diameter": "42 mm", "length": "1 mm", "depth": "40 um"}
     said, edge = texts(with_values(healthy, {"sun.fault": [spall]}))

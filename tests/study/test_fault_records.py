@@ -7,7 +7,14 @@ import pytest
 
 from femgear.errors import CaseError
 from femgear.run import grid_cache, solve
-from femgear.study.fault_records import fault_plan, longest_first, machine_case, record_case, solve_machine
+from femgear.study.fault_records import (
+    fault_plan,
+    longest_first,
+    machine_case,
+    machine_times,
+    record_case,
+    solve_machine,
+)
 from femgear.study.fault_request import FaultRequest
 from femgear.trains.reading import parse_case, read_case, with_values
 
@@ -101,7 +108,7 @@ def test_kinds_come_in_turn_and_draws_differ(plan):
 
 def test_machines_that_take_longest_are_begun_first(case):
     plan = fault_plan(case, FaultRequest(count=80, each=2, seed=3, duration="0.05 s"), cache=grid_cache())
-    order = longest_first(plan, range(40))
+    order = longest_first(machine_times(plan, range(40)))
     assert sorted(order) == list(range(40))
     faults = [machine_case(plan, machine)[1] for machine in order]
     rings = [fault.kind == "crack" and fault.gear == "ring" for fault in faults]
