@@ -95,7 +95,8 @@ def measured_verdict(
     tolerance = order_tolerance(signal.turns, search.tolerance)
     spectrum = windowed_spectrum(signal)
     lines = _judged_lines(spectrum, signal, search.threshold, gear_set, tolerance)
-    order, height = np.array([(line.order, line.amplitude) for line in lines]).reshape(-1, 2).T
+    # a line from elsewhere counts no more than the strongest of the set
+    order, height = np.array([(line.order, 10.0 ** (min(line.level, 0.0) / 20.0)) for line in lines]).reshape(-1, 2).T
     highest = float(spectrum.order[-1])
     _tell_wrong_turns(lines_near_mesh(gear_set, order, height, tolerance, highest), recording, highest)
     return MeasuredVerdict(gear_set, signal, spectrum, lines, tolerance)

@@ -79,12 +79,13 @@ def test_a_verdict_names_the_hum_and_is_that_without_it(tmp_path, recwarn):
     assert [line.level for line in with_hum] == pytest.approx([line.level for line in without], abs=0.05)
 
 
-def test_at_a_constant_speed_hum_is_a_line_from_elsewhere_that_hides_none(tmp_path):
+def test_at_a_constant_speed_hum_is_a_line_from_elsewhere_that_hides_none(tmp_path, recwarn):
     lines = HEALTHY | {17.37: 100.0}
     signal, pulses, _ = recording(lines, lines.values(), wander=0.0, noise=1e-6)
     columns = np.arange(len(signal)) / RATE, signal, pulses
     path = write_columns(tmp_path / "a.csv", "time [s];acc [m/s^2];tacho [V]\n", columns, comma=True)
     verdict = measured_verdict(read_case(CASE), path, Recording(pulses="tacho"))
+    assert not [warning for warning in recwarn if "W-UNSTEADY" in str(warning.message)]
     foreign = [line for line in verdict.lines if line.verdict == VERDICTS[-1]]
     assert [round(line.level) for line in foreign] == [40]
     normal = [round(line.order) for line in verdict.lines if line.verdict == VERDICTS[0]]
