@@ -126,7 +126,7 @@ def _smeared(spectrum: OrderSpectrum, first: float, last: float) -> slice:
 
 @dataclass(frozen=True)
 class _Wave:
-    """A tone with its complex amplitude at the time zero."""
+    """The ``tone``, and its complex amplitude ``height`` at the time zero."""
 
     tone: Tone
     height: complex
