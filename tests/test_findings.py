@@ -559,6 +559,21 @@ def without_compiler(folder: Path) -> tuple[Finding, ...]:
         return told(lambda: write_fmu(chain_model(), folder / "chain.fmu"))
 
 
+def hum(folder: Path) -> tuple[Finding, ...]:
+    """A recording of a set whose speed wanders, beside the hum of the mains."""
+    from recorded_signals import CASE, HEALTHY, RATE, recording, write_columns
+
+    from femgear.measured.heard_set import heard_set
+    from femgear.measured.recordings import read_by_turns
+    from femgear.measured.requests import Recording
+
+    signal, pulses, _ = recording(HEALTHY, HEALTHY.values(), wander=0.02)
+    time = np.arange(len(signal)) / RATE
+    columns = time, signal + np.cos(2 * np.pi * 50.0 * time), pulses
+    path = write_columns(folder / "hum.csv", "time [s];acc [m/s^2];tacho [V]\n", columns)
+    return told(lambda: read_by_turns(path, Recording(pulses="tacho"), heard_set(read_case(CASE))))
+
+
 OTHERS: dict[str, Callable[[Path], Iterable[Finding]]] = {
     "W-CLIPPING": exported("wav", acceleration_scale=1e-6),
     "W-COMPILER": without_compiler,
@@ -568,6 +583,7 @@ OTHERS: dict[str, Callable[[Path], Iterable[Finding]]] = {
     "W-REXS": rexs,
     "W-ROWS": exported("xlsx", rows=3),
     "W-SWEEP": long_sweep,
+    "W-TONE": hum,
     "W-UNSTEADY": unsteady,
 }
 RAISED = {
