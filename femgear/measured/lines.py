@@ -34,6 +34,8 @@ _REACH = 3
 """Bins on either side of a line that a Hann window fills, and one more."""
 _BESIDE = 12
 """Bins without a line of which the noise beside one is taken."""
+_TOGETHER = 1 << 20
+"""Heights of windows that are sorted together."""
 _SCALLOPING = 1.43
 """What a line half way between two bins of a Hann window is lower in either of them [dB]."""
 _BETWEEN_BINS = 1.08
@@ -96,13 +98,18 @@ def _noise_between(amplitude: np.ndarray, at: np.ndarray, lines: np.ndarray, aro
     empty = np.ones(len(amplitude), bool)
     for reach in range(1 - _REACH, _REACH):
         empty[np.clip(lines + reach, 0, len(empty) - 1)] = False
-    noise = np.full(len(at), np.inf)
-    for number, place in enumerate(at):
-        first, last = max(place - around // 2, 0), place + around // 2 + 1
-        left = empty[first:last].copy()
-        left[max(place - first - _REACH + 1, 0) : place - first + _REACH] = False
-        if left.sum() >= _BESIDE:
-            noise[number] = np.median(amplitude[first:last][left])
+    half = around // 2
+    # beyond the ends there is nothing to take
+    heights = np.pad(np.where(empty, amplitude, np.inf), half, constant_values=np.inf)
+    windows = np.lib.stride_tricks.sliding_window_view(heights, around)
+    noise, rows = np.empty(len(at)), max(_TOGETHER // around, 1)
+    for first in range(0, len(at), rows):
+        window = windows[at[first : first + rows]]
+        window[:, half + 1 - _REACH : half + _REACH] = np.inf
+        window.sort(axis=1)
+        left, row = np.isfinite(window).sum(axis=1), np.arange(len(window))
+        median = 0.5 * (window[row, np.maximum(left - 1, 0) // 2] + window[row, left // 2])
+        noise[first : first + rows] = np.where(left >= _BESIDE, median, np.inf)
     return noise
 
 
