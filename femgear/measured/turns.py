@@ -193,9 +193,13 @@ def _unquantised(time: np.ndarray, rate: float, *, steps: bool) -> tuple[np.ndar
     number = np.arange(len(time), dtype=float)
     even = time[0] + number * (time[-1] - time[0]) / (len(time) - 1)
     late = (time - even) * rate
-    smooth = even + make_smoothing_spline(number, late)(number) / rate
+    smooth = even + make_smoothing_spline(number, late, lam=curvature_penalty(late))(number) / rate
     smooth = np.clip(smooth, time - 1.0 / rate, time + 1.0 / rate)
-    halves = [make_smoothing_spline(number[i::2], late[i::2])(number) for i in (0, 1)]
+    every_other = ((number[i::2], late[i::2]) for i in (0, 1))
+    halves = [
+        make_smoothing_spline(at, values, lam=curvature_penalty(values, spacing=2.0))(number)
+        for at, values in every_other
+    ]
     # the last pulse of either half is extrapolated by the other
     half_apart = 0.5 * (halves[0] - halves[1])[1:-1] / rate
     half_apart -= half_apart.mean()
@@ -205,6 +209,42 @@ def _unquantised(time: np.ndarray, rate: float, *, steps: bool) -> tuple[np.ndar
     if left > error**2:
         error, wave = math.sqrt(left), max(wave, math.sqrt(2.0 * (left - error**2)))
     return smooth, error, wave
+
+
+def curvature_penalty(values: np.ndarray, spacing: float = 1.0) -> float:
+    """Choose the penalty on the curvature of a smoothing spline through values (n,) by generalised cross-validation.
+
+    It is the ``lam`` of `scipy.interpolate.make_smoothing_spline`, between zero and n, where the values are ``spacing``
+    apart. SciPy solves banded equations for every penalty that it tries, row by row. At even distances sine waves solve
+    them: the curvatures g of the spline are those of ``(R + a Q'Q) g = Q' y`` (P. J. Green and B. W. Silverman,
+    Nonparametric Regression and Generalized Linear Models, Chapman and Hall, 1994, section 2.3), with the second
+    differences ``Q'``. For sine waves with the second differences t of their own, R is ``1 + t/6`` and Q'Q is ``t^2``,
+    but for the first and the last curvature, whose squares come on top. These two are one equation each for waves that
+    are even and odd about the middle.
+    """
+    from scipy.fft import dst
+    from scipy.optimize import minimize_scalar
+
+    n = len(values)
+    number = np.arange(1, n - 1)
+    difference = -4.0 * np.sin(0.5 * np.pi * number / (n - 1)) ** 2
+    gram, squared = 1.0 + difference / 6.0, difference**2
+    end = 2.0 / math.sqrt(n - 1) * np.sin(np.pi * number / (n - 1))
+    bent = dst(np.diff(values, 2), type=1, norm="ortho")
+
+    def validation(penalty: float) -> float:
+        a = penalty / spacing**3
+        diagonal = gram + a * squared
+        left, missed = float(n - 2), 0.0
+        for waves in (slice(0, None, 2), slice(1, None, 2)):
+            inverse, ends = 1.0 / diagonal[waves], end[waves]
+            stiffening = a / (1.0 + a * (ends**2 * inverse).sum())
+            curvature = (bent[waves] - stiffening * ends * (ends * bent[waves] * inverse).sum()) * inverse
+            left -= (gram[waves] * inverse * (1.0 - stiffening * ends**2 * inverse)).sum()
+            missed += (squared[waves] * curvature**2).sum() + (ends * curvature).sum() ** 2
+        return a**2 * missed * n / left**2
+
+    return float(minimize_scalar(validation, bounds=(0.0, n), method="bounded").x)
 
 
 def constant_turns(channel: Channel, speed: float) -> Turns:

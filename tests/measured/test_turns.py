@@ -8,7 +8,7 @@ from femgear.errors import CaseError
 from femgear.measured.channels import Channel
 from femgear.measured.lines import sharpened_lines
 from femgear.measured.spectra import windowed_spectrum
-from femgear.measured.turns import constant_turns, resample_turns, turns_of_pulses
+from femgear.measured.turns import constant_turns, curvature_penalty, resample_turns, turns_of_pulses
 
 ORDER, VALUE = np.array(list(HEALTHY), float), np.array(list(HEALTHY.values()))
 SIGNAL, PULSES, TURNS = recording(ORDER, VALUE)
@@ -107,6 +107,18 @@ def test_two_pulses_at_one_sample_and_too_slow_a_rate_are_refused():
         turns_of_pulses(channel(values))
     with pytest.raises(CaseError, match="too few samples between pulses"):
         turns_of_pulses(channel(np.arange(4000) % 3 == 0))
+
+
+@pytest.mark.parametrize("noise", [0.01, 0.5, 5.0])
+@pytest.mark.parametrize(("count", "spacing"), [(12, 1.0), (59, 2.0), (200, 1.0)])
+def test_smoothing_is_that_of_scipy(count, spacing, noise):
+    """Which solves banded equations for every penalty that it tries."""
+    from scipy.interpolate import make_smoothing_spline
+
+    place = spacing * np.arange(count)
+    values = np.sin(place / 7.0) + noise * np.random.default_rng(count).uniform(-0.5, 0.5, count)
+    own = make_smoothing_spline(place, values, lam=curvature_penalty(values, spacing))
+    assert own(place) == pytest.approx(make_smoothing_spline(place, values)(place), abs=1e-6)
 
 
 @pytest.mark.parametrize("wander", [0.0, 0.01, 0.05])
