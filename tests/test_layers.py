@@ -43,7 +43,6 @@ SOLVING = {"scipy.linalg", "scipy.sparse", "femgear.stages.protocol"}
 MODULES = sorted(PACKAGE.rglob("*.py"))
 WITHOUT_TEST_FILE = {
     "app/dialogs.py": "what a window asks for, in a browser: tests/browser/test_app.py",
-    "app/fields.py": "the form of a window, in a browser: tests/browser/test_app.py",
     "app/window.py": "a window, in a browser: tests/browser/test_app.py",
     "__main__.py": "calls the command line and nothing else: tests/test_cli.py",
     "exchange/_cad_worker.py": "a process of its own, which test_cad.py starts",

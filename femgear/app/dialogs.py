@@ -3,50 +3,34 @@
 from __future__ import annotations
 
 import inspect
-from collections.abc import Awaitable, Callable
-from dataclasses import dataclass
+from collections.abc import Awaitable, Callable, Mapping
 from typing import Any, get_args
 
 from nicegui import events, ui
 
+from femgear.app.new_case import LABELS, asked_fields
 from femgear.app.session import SUFFIX
 from femgear.gears.gear_steels import Treatment
 from femgear.trains.drafts import KINDS
 
 _LARGEST_FILE = 20_000_000
 """Of what is imported [bytes]."""
-_OF_PAIRS = ("pair", "drivetrain", "gearbox")
-_PAIR = "17 40"
-"""Teeth of a pair."""
-_STEEL, _HARDNESS = "case hardened steel", "720"
+_FIRST = {"module": "2 mm", "speed": "1000 rpm", "treatment": "case hardened steel", "hardness": "720"}
+"""What stands in the fields of a new case at first."""
+_TEETH = {"planetary": "17 37 91", "pair": "17 40", "drivetrain": "17 40", "gearbox": "17 40"}
+"""Teeth that are offered, by kind, where they are not those of `KINDS`."""
+_HINTS = {
+    "planets": "as equal spacing allows",
+    "face_width": "twelve modules",
+    "torque": "usual for this size",
+    "helix": "0 deg",
+}
+"""What holds where a field stays empty."""
 
 
-@dataclass(frozen=True)
-class NewCase:
-    """What a new case begins with.
-
-    Parameters
-    ----------
-    kind : str
-        Of `femgear.trains.drafts.KINDS`.
-    name : str
-        Of its file.
-    teeth : tuple of int
-        Of sun, planet and ring, or of both gears.
-    numbers : dict of str to str
-        Further options of `femgear.trains.drafts.new_case`, those that are given.
-    rating : dict of str to object
-        Entries that its safeties need, by their keys.
-    """
-
-    kind: str
-    name: str
-    teeth: tuple[int, ...]
-    numbers: dict[str, Any]
-    rating: dict[str, Any]
-
-
-def ask_new(free_name: Callable[[str], str], make: Callable[[NewCase], Awaitable[bool]]) -> None:
+def ask_new(
+    free_name: Callable[[str], str], make: Callable[[str, Mapping[str, str]], Awaitable[Mapping[str, str]]]
+) -> None:
     """Ask for the few numbers that a case begins with.
 
     Parameters
@@ -54,43 +38,50 @@ def ask_new(free_name: Callable[[str], str], make: Callable[[NewCase], Awaitable
     free_name : callable
         ``(stem) -> name`` of a file that is not there yet.
     make : callable
-        Makes the case; tells whether that was possible.
+        ``(kind, typed) -> problems``: makes the case of what was typed into the fields of
+        `femgear.app.new_case.LABELS`, or says what is wrong, by the name of the field.
     """
-    with ui.dialog(value=True) as dialog, ui.card().classes("w-96"):
+    fields = dict[str, Any]()
+    with ui.dialog(value=True) as dialog, ui.card().classes("w-[36rem] max-w-full"):
         ui.label("New case").classes("text-lg")
-        kind = ui.select(list(KINDS), value="planetary", label="Kind").classes("w-full")
-        name = _input("Name of the file", free_name("planetary"))
-        teeth = _input("Teeth", " ".join(map(str, KINDS["planetary"])), "sun planet ring, or both gears")
+        with ui.grid(columns=2).classes("w-full gap-x-4 gap-y-1 items-start"):
+            for name, label in LABELS.items():
+                fields[name] = _field_of_new(name, label)
+        beside = ui.label().classes("text-negative said")
+        beside.visible = False
 
         def changed() -> None:
-            usual = _PAIR if kind.value in _OF_PAIRS else " ".join(map(str, KINDS[str(kind.value)]))
-            name.value, teeth.value = free_name(str(kind.value)), usual
-
-        kind.on_value_change(changed)
-        numbers = {
-            "module": _input("Module", "2 mm"),
-            "face_width": _input("Face width", hint="twelve modules"),
-            "torque": _input("Torque of sun or pinion", hint="usual for this size"),
-            "speed": _input("Speed of sun or pinion", "1000 rpm"),
-            "helix": _input("Helix angle", hint="0 deg"),
-        }
-        steels = ["", *map(str, get_args(Treatment))]
-        steel = ui.select(steels, value=_STEEL, label="Material, for its safeties").classes("w-full")
-        hardness = _input("Hardness of the surface, HV or HBW", _HARDNESS)
+            kind = str(fields["kind"].value)
+            fields["name"].value = free_name(kind)
+            fields["teeth"].value = _TEETH.get(kind, " ".join(map(str, KINDS[kind])))
+            for name, field in fields.items():
+                field.visible = name in asked_fields(kind)
 
         async def begin() -> None:
-            try:
-                counts = tuple(int(part) for part in _text(teeth).replace(",", " ").replace("/", " ").split())
-                rating = {"material.treatment": steel.value, "material.hardness": float(_text(hardness))}
-            except ValueError:
-                ui.notify("teeth and hardness are numbers", type="negative")
-                return
-            given = {key: _text(field) for key, field in numbers.items() if _text(field)}
-            case = NewCase(str(kind.value), file_name(_text(name)), counts, given, rating if steel.value else {})
-            if await make(case):
+            kind = str(fields["kind"].value)
+            problems = await make(kind, {name: _text(fields[name]) for name in asked_fields(kind)})
+            for name, field in fields.items():
+                field.error = problems.get(name)
+            others = [text for name, text in problems.items() if name not in fields]
+            beside.text, beside.visible = "\n".join(others), bool(others)
+            if not problems:
                 dialog.close()
 
+        changed()
+        fields["kind"].on_value_change(changed)
         _buttons(dialog, "Begin", begin)
+
+
+def _field_of_new(name: str, label: str) -> Any:
+    """Draw a field of a new case, whose mistake is forgotten as soon as it is changed."""
+    if name == "kind":
+        return ui.select(list(KINDS), value="planetary", label=label).classes("w-full")
+    if name == "treatment":
+        field: Any = ui.select(["", *map(str, get_args(Treatment))], value=_FIRST[name], label=label).classes("w-full")
+    else:
+        field = _input(label, _FIRST.get(name, ""), _HINTS.get(name, ""))
+    field.on_value_change(lambda: setattr(field, "error", None))
+    return field
 
 
 def ask_import(take: Callable[[events.UploadEventArguments], Awaitable[bool]]) -> None:

@@ -13,7 +13,9 @@ from typing import Any
 from nicegui import ui
 
 from femgear.app.document import entry_of
-from femgear.app.form import Embedded, Entry, Table, shown_value, typed_value
+from femgear.app.form import Entry, Table, sentence_of, shape_of, shown_value, table_of_schema, typed_value
+from femgear.errors import FemgearError
+from femgear.trains.reading import case_schema
 
 _HELP = Path(__file__).with_name("help.json")
 _EMPTY = ""
@@ -43,6 +45,22 @@ def label_of(key: str) -> str:
     return words(numbered.replace(".", " "))
 
 
+@cache
+def form_of_model(model: str | None) -> Table:
+    """Form of the files of a model, of planetary sets where it is None; FemgearError where there is no such model."""
+    return table_of_schema(case_schema(model))
+
+
+def form_within(value: Any) -> Table | None:
+    """Form of a case within a case, as the teeth of a stage; None of any other value."""
+    if not isinstance(value, dict) or not isinstance(value.get("set"), dict):
+        return None
+    try:
+        return form_of_model(value.get("model"))
+    except (FemgearError, TypeError):
+        return None
+
+
 class Form:
     """Fields of a case file, which follow its text and what is said of it.
 
@@ -50,17 +68,20 @@ class Form:
     ----------
     change : callable
         ``(key, value)``, called when a field was changed.
+    change_rows : callable
+        The same, called when a list of tables has one more or one less.
     pin : callable
         ``(key)``, called when an entry is wanted as a slider.
-    embedded : callable
-        Gives the form of a case within the case.
     """
 
     def __init__(
-        self, change: Callable[[str, Any], None], pin: Callable[[str], None], embedded: Embedded = lambda value: None
+        self,
+        change: Callable[[str, Any], None],
+        change_rows: Callable[[str, Any], None],
+        pin: Callable[[str], None],
     ) -> None:
-        self._change, self._pin, self._embedded = change, pin, embedded
-        self._fields = dict[str, tuple[Entry, Any]]()
+        self._change, self._change_rows, self._pin = change, change_rows, pin
+        self._fields = dict[str, tuple[Entry, Any, Any]]()
         self._folds = dict[str, Any]()
         self._open = set[str]()
         self._table: Table | None = None
@@ -80,16 +101,50 @@ class Form:
             for part in table.parts:
                 if isinstance(part, Table):
                     self._fold(part, part.name, tables.get(part.name))
+        self._mark_folds()
+
+    def follow(self, table: Table, tables: Any) -> None:
+        """Show changed values, in the fields that are there where the file has the same entries as before.
+
+        The field in which one types keeps what was typed.
+        """
+        if table is not self._table or shape_of(tables) != shape_of(self._tables):
+            self.show(table, tables)
+            return
+        self.take(tables)
+
+    def take(self, tables: Any) -> None:
+        """Show changed values in the fields that are there, without further ones."""
+        self._tables = tables
+        for key, (entry, field, pin) in self._fields.items():
+            value = entry_of(tables, key)
+            if typed_value(entry, str(field.value or "")) != value:
+                self._fill(entry, field, value)
+            if pin is not None:
+                pin.visible = value not in (None, "", [])
+
+    @staticmethod
+    def _fill(entry: Entry, field: Any, value: Any) -> None:
+        """Write the value of an entry into its field."""
+        text = shown_value(value)
+        if entry.kind in ("choice", "switch") and text not in field.options:
+            field.set_options([*field.options, text], value=text)
+        else:
+            field.value = text
 
     def say(
         self, problems: Iterable[Mapping[str, str]], findings: Iterable[Mapping[str, str]], values: Mapping
     ) -> None:
         """Show what is said of the entries beside their fields, and what was estimated for those left out."""
         self._values = values
-        self._said = {finding["key"]: ("look", _sentence(finding)) for finding in findings if finding["key"]}
-        self._said |= {problem["key"]: ("bad", _sentence(problem)) for problem in problems if problem["key"]}
-        for key, (entry, field) in self._fields.items():
+        self._said = {finding["key"]: ("look", sentence_of(finding)) for finding in findings if finding["key"]}
+        self._said |= {problem["key"]: ("bad", sentence_of(problem)) for problem in problems if problem["key"]}
+        for key, (entry, field, _) in self._fields.items():
             self._mark(key, entry, field)
+        self._mark_folds()
+
+    def _mark_folds(self) -> None:
+        """Show in which folds something is said of an entry."""
         for key, fold in self._folds.items():
             states = {
                 state for at, (state, _) in self._said.items() if at == key or at.startswith((f"{key}.", f"{key}["))
@@ -137,7 +192,7 @@ class Form:
             with ui.row().classes("w-full items-center no-wrap"):
                 ui.label(f"{words(table.name)} {number + 1}").classes("grow font-bold")
                 removed = f"{key}[{number}]"
-                button = ui.button(icon="delete", on_click=partial(self._change, removed, None))
+                button = ui.button(icon="delete", on_click=partial(self._change_rows, removed, None))
                 button.props(f'flat dense round size=sm aria-label="Remove {words(table.name)} {number + 1}"')
             self._inside(table, f"{key}[{number}]", row if isinstance(row, dict) else {})
         needed = [part for part in table.parts if isinstance(part, Entry) and part.needed]
@@ -158,7 +213,7 @@ class Form:
         shown = [entry for entry in entries if entry.needed or entry.name in value]
         others = [entry for entry in entries if entry not in shown]
         for entry in shown:
-            inner = self._embedded(value.get(entry.name))
+            inner = form_within(value.get(entry.name))
             if inner is not None:
                 self._fold(replace(inner, name=entry.name), prefix + entry.name, value.get(entry.name))
             else:
@@ -174,7 +229,7 @@ class Form:
             content.clear()
             with content:
                 for entry in others:
-                    self._field(entry, prefix + entry.name, None)
+                    self._field(entry, prefix + entry.name, entry_of(self._tables, prefix + entry.name))
 
         def toggled(event: Any) -> None:
             (self._open.add if event.value else self._open.discard)(key)
@@ -190,7 +245,9 @@ class Form:
         text = shown_value(value)
 
         def changed(event: Any) -> None:
-            self._change(key, typed_value(entry, str(event.value or "")))
+            typed = typed_value(entry, str(event.value or ""))
+            if typed != entry_of(self._tables, key):  # else it is the form that filled it
+                self._change(key, typed)
 
         with ui.row().classes("w-full items-start no-wrap gap-0"):
             if entry.kind in ("choice", "switch"):
@@ -202,14 +259,16 @@ class Form:
                     "debounce=300 autocomplete=off"
                 )
             field.classes("grow").props(f'dense stack-label data-key="{key}"')
-            if entry.kind in ("quantity", "number", "list") and value not in (None, "", []):
+            pin = None
+            if entry.kind in ("quantity", "number", "list"):
                 pin = ui.button(icon="tune", on_click=lambda: self._pin(key))
                 pin.props(f'flat dense round size=sm tabindex=-1 aria-label="Slider of {words(entry.name)}"')
+                pin.visible = value not in (None, "", [])
             explained = ". ".join(text for text in (help_of(key), entry.hint) if text)
             if explained:
                 with field:
                     ui.tooltip(explained).classes("explained").props("delay=500")
-        self._fields[key] = entry, field
+        self._fields[key] = entry, field, pin
         self._mark(key, entry, field)
 
     def _mark(self, key: str, entry: Entry, field: Any) -> None:
@@ -228,11 +287,4 @@ class Form:
         first = needed[0] if needed else next(part for part in table.parts if isinstance(part, Entry))
         value = first.choices[0] if first.choices else 1 if first.kind in ("integer", "number") else _EMPTY
         self._open.add(key)
-        self._change(f"{key}[{number}].{first.name}", value)
-
-
-def _sentence(said: Mapping[str, str]) -> str:
-    """What is said of an entry in one line."""
-    limit = f" (allowed: {said['limit']})" if said.get("limit") else ""
-    remedy = f"; {said['remedy']}" if said.get("remedy") else ""
-    return f"{said['text']}{limit}{remedy} [{said['code']}]" if said.get("code") else f"{said['text']}{limit}{remedy}"
+        self._change_rows(f"{key}[{number}].{first.name}", value)

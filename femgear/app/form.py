@@ -181,6 +181,23 @@ def shown_inner(value: Any) -> str:
     return shown_value(value)
 
 
+def shape_of(value: Any) -> Any:
+    """Tables, lists of tables and names of entries of a case file without their values: what its form consists of."""
+    if isinstance(value, dict):
+        return {name: shape_of(part) for name, part in value.items()}
+    if isinstance(value, list) and any(isinstance(part, dict) for part in value):
+        return [shape_of(part) for part in value]
+    return None
+
+
+def sentence_of(said: Mapping[str, str]) -> str:
+    """Write in one line what is said of an entry: its text, what is allowed, a remedy and the code."""
+    limit = f" (allowed: {said['limit']})" if said.get("limit") else ""
+    remedy = f"; {said['remedy']}" if said.get("remedy") else ""
+    code = f" [{said['code']}]" if said.get("code") else ""
+    return f"{said['text']}{limit}{remedy}{code}"
+
+
 def typed_value(entry: Entry, text: str) -> Any:
     """Turn what was typed into a field into the value of the entry; None of an empty field.
 

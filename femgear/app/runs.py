@@ -1,9 +1,9 @@
-"""What the app computes as a whole: runs with their reports, comparisons, new cases and imports; in a process."""
+"""What the app computes as a whole: runs with their reports, comparisons and imports; in a process."""
 
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import Any
@@ -17,7 +17,6 @@ from femgear.run import export_results, run_case
 from femgear.stages.summary_data import run_data
 from femgear.storage.files import list_own, own_files, write_text
 from femgear.storage.results import EXPORTED, additions, folder_lock, run_folder
-from femgear.trains.drafts import ToothForm, new_case
 from femgear.trains.imports import case_drafts
 from femgear.trains.reading import open_results, parse_case
 from femgear.trains.registry import check_case, same_train, train_of
@@ -100,12 +99,6 @@ class Runs:
             results = open_results(folder)
             return export_results(results, new / EXPORTED, formats, Sampling(), progress=self._progress)
 
-    def new(self, kind: str, given: Mapping[str, Any]) -> str:
-        """Write a commented case from a few numbers, see `femgear.trains.drafts.new_case`."""
-        numbers = dict(given)
-        form = ToothForm(helix=numbers.pop("helix", None))
-        return new_case(kind, **numbers, form=form)
-
     def imported(self, path: str, stem: str) -> list[dict[str, Any]]:
         """Read the gearbox, or the stages, of a REXS file: name, text and findings of every case.
 
@@ -134,5 +127,5 @@ def serve_runs(pipe: Connection, folder: Path) -> None:
     """Answer for a folder by the functions of `Runs`; the progress of a run comes before its end."""
     requests = Requests(pipe)
     runs = Runs(folder, tell=requests.tell)
-    names = "run", "compare", "export", "new", "imported"
+    names = "run", "compare", "export", "imported"
     requests.answer({name: getattr(runs, name) for name in names})

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -71,30 +70,32 @@ class Session:
             self._drop_draft()
         return self.unsaved
 
-    def begin(self, name: str, text: str) -> None:
-        """Begin a new case file, which is there once it is saved.
+    def check_new(self, name: str) -> None:
+        """Refuse the name of a new case file.
 
         Raises
         ------
         CaseError
             E-FILE: a name that no case file can have. E-OUTPUT: there is such a file.
         """
-        path = _case_file(self.folder, name)
-        if path.exists():
+        if _case_file(self.folder, name).exists():
             raise CaseError("there is such a file", code="E-OUTPUT", key="name", value=name, remedy="take another name")
+
+    def begin(self, name: str, text: str) -> None:
+        """Begin a new case file, which is there once it is saved.
+
+        Raises
+        ------
+        CaseError
+            As of `check_new`.
+        """
+        self.check_new(name)
         self.name, self.text, self._saved, self._before, self._after = name, text, None, [], []
         self.keep()
 
     def change(self, key: str, value: Any) -> None:
         """Change an entry, or take it out where the value is None; see `femgear.app.document.with_entry`."""
         self.replace(with_entry(self.text, key, value))
-
-    def change_all(self, values: Mapping[str, Any]) -> None:
-        """Change several entries in one step."""
-        text = self.text
-        for key, value in values.items():
-            text = with_entry(text, key, value)
-        self.replace(text)
 
     def replace(self, text: str) -> None:
         """Take another text.
@@ -179,6 +180,14 @@ def case_files(folder: Path) -> list[str]:
     names = {path.name for path in folder.glob(f"*{SUFFIX}") if path.is_file()}
     drafts = {path.name[1:].removesuffix(".draft") for path in folder.glob(f".*{SUFFIX}.draft")}
     return sorted(names | drafts)
+
+
+def first_shown(folder: Path) -> str | None:
+    """Name of the case file that a window begins with: the one edited last and not saved, else the first; or None."""
+    drafts = {os.path.getmtime(path): path for path in folder.glob(f".*{SUFFIX}.draft")}
+    if drafts:
+        return drafts[max(drafts)].name[1:].removesuffix(".draft")
+    return next(iter(case_files(folder)), None)
 
 
 def result_folders(folder: Path) -> list[str]:

@@ -28,6 +28,10 @@ class WorkerError(Exception):
     """What was asked for could not be computed, in the words of the process that tried."""
 
 
+class WorkerStopped(WorkerError):
+    """What was asked for was stopped on purpose."""
+
+
 class Worker:
     """A process that answers one request after the other.
 
@@ -74,7 +78,7 @@ class Worker:
         Raises
         ------
         WorkerError
-            It failed, or the process ended.
+            It failed, or the process ended; WorkerStopped where `stop` ended it.
         """
         self._number += 1
         number = self._number
@@ -94,7 +98,7 @@ class Worker:
         while True:
             pipe = self._pipe
             if pipe is None:
-                raise WorkerError("it was stopped")
+                raise WorkerStopped("it was stopped")
             try:
                 if not pipe.poll():
                     if not self.alive:

@@ -6,8 +6,8 @@ from pathlib import Path
 import pytest
 
 from femgear.app.runs import COMPARED, Runs
-from femgear.errors import CaseError, FemgearError
-from femgear.trains.reading import open_results, parse_case
+from femgear.errors import FemgearError
+from femgear.trains.reading import open_results
 
 CASES = Path(__file__).parents[2] / "cases"
 
@@ -39,14 +39,6 @@ def test_runs_are_those_of_the_command_and_tell_how_far_they_are(folder, text):
     )
     runs.run(text, "a.toml", "two", False)
     assert runs.compare("one", "two") == f"one_and_two/{COMPARED}" and (folder / "one_and_two" / COMPARED).exists()
-
-
-def test_a_new_case_can_be_read(folder):
-    text = Runs(folder).new("pair", {"teeth": (20, 30), "module": "3 mm", "helix": "15 deg"})
-    case = parse_case(text)
-    assert case.gear_1.teeth == 20 and case.helix_angle == pytest.approx(0.2618, rel=1e-3)
-    with pytest.raises(CaseError):
-        Runs(folder).new("pair", {"teeth": (20,)})
 
 
 def test_a_file_that_is_no_rexs_is_refused(folder):

@@ -29,7 +29,7 @@ def test_a_change_is_kept_beside_the_file_until_it_is_saved(session, tmp_path):
 
 def test_changes_are_taken_back_and_made_again(session):
     session.change("title", "b")
-    session.change_all({"title": "c", "format": 1})
+    session.replace('title = "c"\nformat = 1\n')
     assert session.undo() and '"b"' in session.text and session.undo() and session.text == TEXT
     assert not session.undo() and not session.unsaved
     assert session.redo() and session.redo() and not session.redo() and "format = 1" in session.text

@@ -37,7 +37,9 @@ class Served:
     def __init__(self, folder: Path) -> None:
         self.folder = folder
         command = [sys.executable, "-m", "femgear", "app", str(folder), "--no-browser"]
-        self.process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
+        self.log = folder.with_name(f"{folder.name}.log")
+        with open(self.log, "w", encoding="utf-8") as log:
+            self.process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=log, text=True)
         self.address = re.search(r"http://127\.0\.0\.1:\d+/\?token=\S+", self.process.stdout.readline())[0]
 
     def end(self, signal_sent: signal.Signals = signal.SIGINT) -> None:
@@ -180,6 +182,50 @@ def test_sliders_move_with_mouse_and_keys(window, serve, folder):
     assert float(saved(tab, folder)["operation"]["torque"].split()[0]) < float(torque.split()[0])
 
 
+def place_of(tab, key: str) -> float:
+    return float(tab.locator(f'[data-slider="{key}"]').get_attribute("aria-valuenow"))
+
+
+def test_field_text_and_slider_are_one_value(window, serve, folder):
+    tab = window(serve(folder))
+    answer_to(tab)
+    unfold(tab, "operation")
+    torque, speed = "operation.torque", "operation.speeds[0]"
+    field(tab, torque).click()
+    tab.keyboard.press("Control+A")
+    answer_to(tab, lambda: tab.keyboard.type("150 N m"))
+    assert place_of(tab, torque) == 150.0
+    # the slider of a speed, by the mouse: fields follow while it is held
+    box = tab.locator(f'[data-slider="{speed}"]').bounding_box()
+    x, y = box["x"] + 0.5 * box["width"], box["y"] + 0.5 * box["height"]
+    tab.mouse.move(x, y)
+    tab.mouse.down()
+    for step in range(1, 11):
+        tab.mouse.move(x + 0.02 * step * box["width"], y)
+        tab.wait_for_timeout(30)
+    tab.wait_for_function("() => parseFloat(document.querySelector('[data-key=\"operation.speeds\"]').value) > 1250")
+    tab.mouse.move(x - 0.25 * box["width"], y)
+    tab.wait_for_function("() => parseFloat(document.querySelector('[data-key=\"operation.speeds\"]').value) < 750")
+    answer_to(tab, tab.mouse.up)
+    held = place_of(tab, speed)
+    assert field(tab, "operation.speeds").input_value() == f"{held:g} rpm" and held < 750
+    # the text
+    tab.get_by_role("tab", name="Text").click()
+    tab.locator(".cm-content").get_by_text('torque = "150 N m"').dblclick()
+    line = tab.locator(".cm-line", has_text="150 N m")
+    line.click()
+    tab.keyboard.press("Home")
+    tab.keyboard.press("Shift+End")
+    answer_to(tab, lambda: tab.keyboard.type('torque = "250 N m"'))
+    assert place_of(tab, torque) == 250.0
+    tab.get_by_role("tab", name="Form").click()
+    assert field(tab, torque).input_value() == "250 N m"
+    assert (
+        saved(tab, folder)["operation"] | {"torque": "250 N m", "speeds": [f"{held:g} rpm"]}
+        == saved(tab, folder)["operation"]
+    )
+
+
 def test_a_list_grows_and_shrinks(window, serve, folder):
     tab = window(serve(folder))
     answer_to(tab)
@@ -230,6 +276,29 @@ def test_a_new_set_is_made_without_a_file(window, serve, tmp_path):
     assert not list(tmp_path.glob(".*.draft"))
 
 
+def test_all_that_is_wrong_with_a_new_case_stands_beside_its_fields(window, serve, folder):
+    tab = window(serve(folder))
+    press(tab, "New")
+    dialog = tab.get_by_role("dialog")
+    wrong = {"Name of the file": "set", "Teeth": "17 x 91", "Module": "2", "Speed of sun or pinion": "fast"}
+    for label, text in wrong.items():
+        dialog.get_by_label(label, exact=True).fill(text)
+    press(tab, "Begin")
+    marked = dialog.locator(".q-field--error")
+    marked.first.wait_for()
+    assert marked.count() == len(wrong) and "--" not in dialog.inner_text()
+    tab.wait_for_timeout(7000)
+    assert marked.count() == len(wrong), "mistakes stay until they are mended"
+    dialog.get_by_label("Module", exact=True).fill("3 mm")
+    assert marked.count() == len(wrong) - 1
+    for label, text in {"Name of the file": "own", "Teeth": "17 37 91", "Speed of sun or pinion": "900 rpm"}.items():
+        dialog.get_by_label(label, exact=True).fill(text)
+    answer_to(tab, lambda: press(tab, "Begin"))
+    press(tab, "Save")
+    tab.get_by_text("saved", exact=True).wait_for()
+    assert tomllib.loads((folder / "own.toml").read_text())["operation"]["speeds"] == ["900 rpm"]
+
+
 def test_a_run_is_computed_shown_and_compared(window, serve, tmp_path):
     folder = tmp_path
     pair = re.sub(r"^positions = .*$", "positions = 8", (CASES / "spur_pair.toml").read_text(), flags=re.MULTILINE)
@@ -258,13 +327,16 @@ def test_a_run_is_computed_shown_and_compared(window, serve, tmp_path):
 
 
 def test_a_run_is_cancelled(window, serve, folder):
-    tab = window(serve(folder))
+    server = serve(folder)
+    tab = window(server)
     answer_to(tab)
     press(tab, "Run")
     tab.get_by_role("dialog").get_by_role("button", name="Run").click()
     tab.get_by_role("dialog").wait_for(state="hidden")
     press(tab, "Cancel")
     tab.get_by_role("button", name="Cancel", exact=True).wait_for(state="hidden")
+    tab.get_by_text("The run was cancelled").wait_for()
+    assert server.log.read_text() == "femgear app: the run into set_1 was cancelled\n"
     assert not (folder / "set_1" / "report.html").exists()
 
 
@@ -302,6 +374,10 @@ def test_nothing_is_lost_with_the_server(window, serve, folder):
     tab.wait_for_timeout(1500)
     server.end(signal.SIGKILL)
     assert (folder / "set.toml").read_text() == coarse_case()
+    ended = tab.get_by_role("dialog", name="The app has ended")
+    ended.wait_for()
+    assert f"femgear app {folder}" in ended.inner_text() and "Nothing is lost" in ended.inner_text()
+    (folder / "a_first_one.toml").write_text(coarse_case())
     again = window(serve(folder))
     again.get_by_text("changes that were not saved are back").wait_for()
     press(again, "Back to the file")
