@@ -211,12 +211,18 @@ def test_field_text_and_slider_are_one_value(window, serve, folder):
     assert field(tab, "operation.speeds").input_value() == f"{held:g} rpm" and held < 750
     # the text
     tab.get_by_role("tab", name="Text").click()
-    tab.locator(".cm-content").get_by_text('torque = "150 N m"').dblclick()
     line = tab.locator(".cm-line", has_text="150 N m")
+    tab.locator(".cm-content").hover()
+    for _ in range(50):  # lines out of sight are not drawn
+        if line.count():
+            break
+        tab.mouse.wheel(0, 300)
+        tab.wait_for_timeout(100)
     line.click()
     tab.keyboard.press("Home")
     tab.keyboard.press("Shift+End")
-    answer_to(tab, lambda: tab.keyboard.type('torque = "250 N m"'))
+    # before what is left of the comment of the line
+    answer_to(tab, lambda: tab.keyboard.type('torque = "250 N m"  # '))
     assert place_of(tab, torque) == 250.0
     tab.get_by_role("tab", name="Form").click()
     assert field(tab, torque).input_value() == "250 N m"
@@ -290,7 +296,7 @@ def test_all_that_is_wrong_with_a_new_case_stands_beside_its_fields(window, serv
     tab.wait_for_timeout(7000)
     assert marked.count() == len(wrong), "mistakes stay until they are mended"
     dialog.get_by_label("Module", exact=True).fill("3 mm")
-    assert marked.count() == len(wrong) - 1
+    marked.nth(len(wrong) - 1).wait_for(state="detached")
     for label, text in {"Name of the file": "own", "Teeth": "17 37 91", "Speed of sun or pinion": "900 rpm"}.items():
         dialog.get_by_label(label, exact=True).fill(text)
     answer_to(tab, lambda: press(tab, "Begin"))
