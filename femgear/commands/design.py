@@ -11,7 +11,7 @@ from typing import Annotated, Any
 from cyclopts import Parameter
 
 from femgear.commands.files import write_case_file
-from femgear.commands.program import Quantity, Whole, app, whole_number
+from femgear.commands.program import Quantity, Whole, app, examples, whole_number
 from femgear.commands.terminal import Progress, print_blocks, print_findings, say
 from femgear.study.teeth_request import TeethStrength, WantedTeeth
 
@@ -43,7 +43,12 @@ class ToothOptions:
     addendum: float | None = None
 
 
-@app.command
+@app.command(
+    help_epilogue=examples(
+        'femgear new planetary -o set.toml --teeth 17 37 91 --torque "200 N m"',
+        'femgear new pair -o pair.toml --teeth 17 40 --module "3 mm"',
+    )
+)
 def new(
     kind: str,
     /,

@@ -13,7 +13,7 @@ from cyclopts import Parameter
 
 import femgear
 from femgear.commands.files import need_new_files, write_case_file
-from femgear.commands.program import Whole, app
+from femgear.commands.program import Whole, app, examples
 from femgear.commands.terminal import Progress, print_findings, say
 from femgear.errors import CaseError, FemgearError, printable
 from femgear.exchange.sampling import Sampling
@@ -206,7 +206,15 @@ class ModelFiles:
         return {option: path for option, path in named.items() if path is not None}
 
 
-@app.command
+@app.command(
+    help_epilogue=examples(
+        "# of the results of femgear run planetary.toml",
+        "femgear export planetary_results --csv --xlsx",
+        "femgear export planetary_results --wav -o sounds",
+        "# of a case file, without a run",
+        "femgear export planetary.toml --state-space model.npz",
+    )
+)
 def export(
     folder: Path,
     /,

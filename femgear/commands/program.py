@@ -30,6 +30,11 @@ app = App(
 )
 
 
+def examples(*lines: str) -> str:
+    """Write whole commands to be copied, for the end of the help of a command; a line that begins with # explains."""
+    return "\n".join(["Examples:", *(f"  {line}" for line in lines)])
+
+
 Quantity = Annotated[str, Parameter(allow_leading_hyphen=True)]
 """A number with its unit, which may be negative."""
 

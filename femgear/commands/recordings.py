@@ -9,14 +9,19 @@ from typing import Annotated
 from cyclopts import Parameter
 
 from femgear.commands.files import write_case_file
-from femgear.commands.program import Tasks, app
+from femgear.commands.program import Tasks, app, examples
 from femgear.commands.terminal import Progress, print_blocks, say
 from femgear.errors import CaseError
 from femgear.measured.requests import FurtherFiles, LineSearch, Recording
 from femgear.study.fault_request import FaultRequest, FurtherRecords
 
 
-@app.command
+@app.command(
+    help_epilogue=examples(
+        "femgear measured planetary.toml recording.csv --channel acc -o measured",
+        'femgear measured planetary.toml recording.wav --speed "1500 rpm" --causes',
+    )
+)
 def measured(
     case: Path,
     signal: Path,
@@ -68,7 +73,14 @@ def measured(
     return 0
 
 
-@app.command
+@app.command(
+    help_epilogue=examples(
+        "# orders at which faults are heard",
+        "femgear faults planetary.toml",
+        "# twenty labelled signals",
+        "femgear faults planetary.toml -o signals --count 20 --seed 7 --wav",
+    )
+)
 def faults(
     case: Path,
     /,

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated
 from cyclopts import Parameter
 
 from femgear.commands.files import results_folder
-from femgear.commands.program import app
+from femgear.commands.program import app, examples
 from femgear.commands.terminal import (
     Progress,
     print_blocks,
@@ -97,7 +97,12 @@ def _refused_stages(case: ReadCase) -> str:
     return f"femgear run without --only refuses this case ({refused}){others}:"
 
 
-@app.command
+@app.command(
+    help_epilogue=examples(
+        "femgear run planetary.toml",
+        "femgear run planetary.toml -o results --only modes --no-pictures",
+    )
+)
 def run(
     case: Path | None = None,
     /,

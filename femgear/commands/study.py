@@ -12,12 +12,19 @@ from typing import Annotated, Any, Literal
 from cyclopts import Parameter
 
 from femgear.commands.files import need_new_files, write_case_file
-from femgear.commands.program import Quantity, Tasks, Whole, app
+from femgear.commands.program import Quantity, Tasks, Whole, app, examples
 from femgear.commands.terminal import Progress, print_blocks, say
 from femgear.errors import CaseError
 
 
-@app.command(name="sweep")
+@app.command(
+    name="sweep",
+    help_epilogue=examples(
+        'femgear sweep planetary.toml --over "operation.torque=50 N m,100 N m" -o sweep',
+        'femgear sweep planetary.toml -o widths --of "root stress sun" --of ste \\',
+        '  --over "set.face_width=20 mm..40 mm/5"',
+    ),
+)
 def compute_sweep(
     case: Path,
     /,
@@ -266,7 +273,14 @@ class Sought:
     speeds: tuple[str, str] | None = None
 
 
-@app.command
+@app.command(
+    help_epilogue=examples(
+        "# the tip relief with the least transmission error",
+        "femgear optimise planetary.toml -o optimum",
+        "# the one with the least mesh force, at another torque",
+        'femgear optimise planetary.toml -o calm --goal "mesh force" --torque "150 N m"',
+    )
+)
 def optimise(
     case: Path,
     /,
