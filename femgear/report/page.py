@@ -52,7 +52,7 @@ _CHARTS = "charts.json"
 """File of what the charts of the page show."""
 _DATA = {_CHARTS: "charts", SOLID: "solid", SPACE: "space", EXPLORER: "runup"}
 """Files of a run that the scripts of its page draw, and their names there."""
-_WORDS_ROOM = 2150
+_WORDS_ROOM = 2200
 """Characters of the longest card and of the sentence, which is four cards wide, over the width of all, from which on
 gears and charts below are drawn smaller."""
 _CAPTION = 100

@@ -70,14 +70,15 @@ page.trace = (one, panel, key, seen) => {
   return trace;
 };
 
-page.axis = (axis, share, other, narrow, pixels) => {
+page.axis = (axis, share, other, narrow, pixels, side) => {
   const found = { domain: share, anchor: other, zeroline: false, gridcolor: page.style("--rule"), linecolor: page.style("--soft"),
     showline: true, ticks: "outside", tickcolor: page.style("--soft"), exponentformat: "power", automargin: true,
     title: { text: page.wrapped(axis.title || "", pixels).text, standoff: 8 }, type: axis.log ? "log" : "linear" };
   if (axis.range) found.range = axis.log ? axis.range.map(Math.log10) : axis.range;
   if (axis.ticks) Object.assign(found, { tickmode: "array", tickvals: axis.ticks, tickangle: axis.angle,
     ticktext: axis.texts.map((text) => page.clear(narrow && axis.angle ? text.split("\n")[0] : text)) });
-  if (axis.log) found.dtick = 1;
+  // a number needs a line of its own
+  if (axis.log) found.dtick = axis.range ? Math.max(1, Math.ceil((18 * Math.log10(axis.range[1] / axis.range[0])) / side)) : 1;
   else found.tickformat = ",~r";
   if (axis.hidden) Object.assign(found, { visible: false });
   if (narrow) found.nticks = 5;
@@ -89,7 +90,7 @@ page.along = (word, share) => 6.6 * Math.abs(share(word.angle * Math.PI / 180)) 
 
 // room that slanted words at the upper end of the first panels need above it [px]
 page.headroom = (chart) => Math.max(0, ...chart.panels.flatMap((panel) => panel.words.map((word) => {
-  if (word.paper || !word.angle || !panel.y.range || panel.place[0] || word.align[1] !== "bottom") return 0;
+  if (word.paper || word.above || !word.angle || !panel.y.range || panel.place[0] || word.align[1] !== "bottom") return 0;
   const at = panel.y.log ? Math.log10 : Number, [low, high] = panel.y.range.map(at);
   return page.along(word, Math.sin) + 14 - word.shift[1] - (Math.max(0, high - at(word.y)) / (high - low)) * 210;
 })));
@@ -117,7 +118,8 @@ page.arrange = (chart, width) => {
   const pixels = (width - left - right + across) / columns - across;
   const lines = Math.max(1, ...chart.panels.map((panel) => page.wrapped(panel.title, pixels).lines));
   const title = chart.title ? page.wrapped(chart.title, 0.8 * width) : { text: "", lines: 0 };
-  const foot = page.footroom(chart), above = 20 + 16 * lines + (title.lines && 10 + 20 * title.lines);
+  const foot = page.footroom(chart), lift = Math.max(...chart.panels.map(page.lift));
+  const above = 20 + 16 * lines + lift + (title.lines && 10 + 20 * title.lines);
   const gaps = { x: across, y: hidden ? 14 + 16 * lines : (single ? 74 : 66) + 16 * lines + foot, left, right, top: Math.max(above, page.headroom(chart)), bottom: 62 + foot };
   const ratio = chart.size[1] / chart.size[0];
   const cell = chart.panels[0].square ? Math.min((width - 40) / columns, 460) * 1.02 : single ? 250 : Math.min(Math.max((width * ratio) / rows, chart.least || 210), 340);
@@ -133,15 +135,29 @@ page.arrange = (chart, width) => {
   return { height, places, gaps, inner, title: title.text };
 };
 
+// range of an ordinate without the room that words have in a picture
+page.closer = ({ y, traces }) => {
+  const largest = Math.max(...traces.flatMap((one) => one.y || []).filter(Number.isFinite));
+  return largest > y.range[0] ? [y.range[0], Math.min(y.range[1], y.range[0] + 1.08 * (largest - y.range[0]))] : y.range;
+};
+
+// room that words above a small panel need between it and its title [px]
+page.lift = (panel) => Math.max(0, ...panel.words.map((word) => (word.above ? 10 + page.along(word, Math.sin) : 0)));
+
 // one panel alone, for page one, with the title of the axis that it shares
 page.chartOf = (div) => {
   const chart = page.data.charts[div.dataset.chart];
   if (div.dataset.panel === undefined) return chart;
   const number = Number(div.dataset.panel), panel = chart.panels[number], titles = chart.panels.map(({ x }) => x.title).filter(Boolean);
   const x = { ...panel.x, title: panel.x.title || titles[titles.length - 1] };
-  // slanted words at the ends of lines lie flat, which takes less room above the panel
-  const words = panel.words.map((word) => (!word.paper && word.angle % 90 ? { ...word, angle: 0, align: ["center", word.align[1]] } : word));
-  return { ...chart, rows: 1, columns: 1, size: [8, div.closest(".many") ? 1.3 : div.closest(".both") || div.closest(".paper") ? 1.75 : 3.4], least: div.closest(".many") ? 90 : 110, title: "", panels: [{ ...panel, x, words, place: [0, 1, 0, 1], shared: 0 },
+  // slanted words at the ends of lines lie flat, which takes less room above the panel; upright ones stand above it, where no curve
+  // is, and names of curves are left to the legend
+  const named = (word) => panel.traces.some(({ name }) => name && name.startsWith(word.text));
+  const upright = (word) => !word.paper && Math.abs(word.angle) === 90;
+  const words = panel.words.filter((word) => !named(word)).map((word) => (upright(word) ? { ...word, above: true }
+    : !word.paper && word.angle % 90 ? { ...word, angle: 0, align: ["center", word.align[1]] } : word));
+  const y = words.some(({ above }) => above) && !panel.y.log ? { ...panel.y, range: page.closer(panel) } : panel.y;
+  return { ...chart, rows: 1, columns: 1, size: [8, div.closest(".many") ? 1.3 : div.closest(".both") || div.closest(".paper") ? 1.75 : 3.4], least: div.closest(".many") ? 90 : 110, title: "", panels: [{ ...panel, x, y, words, place: [0, 1, 0, 1], shared: 0 },
     ...chart.panels.filter(({ over }) => over === number).map((twin) => ({ ...twin, place: [0, 1, 0, 1], shared: 0, over: 0 }))] };
 };
 
@@ -159,7 +175,7 @@ page.shorten = (traces, count, most) => {
 page.draw = (div) => {
   const chart = page.chartOf(div), width = Math.max(div.clientWidth, 280);
   const { height, places, gaps, inner, title } = page.arrange(chart, width);
-  const seen = new Set(), traces = [], notes = [], narrow = width < 620;
+  const seen = new Set(), traces = [], notes = [], shapes = [], narrow = width < 620;
   const layout = { height, width, margin: { l: gaps.left, r: gaps.right, t: gaps.top, b: gaps.bottom }, paper_bgcolor: "rgba(0,0,0,0)",
     plot_bgcolor: "rgba(0,0,0,0)", font: { family: "system-ui, Segoe UI, DejaVu Sans, sans-serif", size: narrow ? 11 : 13, color: page.style("--ink") },
     hovermode: "closest", hoverlabel: { align: "left" }, modebar: { bgcolor: "rgba(0,0,0,0)", color: page.style("--soft"), activecolor: page.style("--ink") }, dragmode: narrow ? false : "zoom",
@@ -172,8 +188,8 @@ page.draw = (div) => {
     const place = places[i], first = panel.shared ? String(panel.shared + 1) : "";
     // titles are as long as their axes and the gap beside them; letters of titles are larger than those of words
     const long = (ends, side, gap) => 0.85 * ((ends[1] - ends[0]) * side + 0.6 * gap);
-    if (under === null) layout["xaxis" + end] = page.axis(panel.x, place.x, key.y, narrow, long(place.x, inner.w, gaps.x));
-    layout["yaxis" + end] = page.axis(panel.y, place.y, key.x, false, long(place.y, inner.h, gaps.y));
+    if (under === null) layout["xaxis" + end] = page.axis(panel.x, place.x, key.y, narrow, long(place.x, inner.w, gaps.x), (place.x[1] - place.x[0]) * inner.w);
+    layout["yaxis" + end] = page.axis(panel.y, place.y, key.x, false, long(place.y, inner.h, gaps.y), (place.y[1] - place.y[0]) * inner.h);
     if (under !== null) {
       const colour = page.colour((panel.traces.find(({ line }) => line) || { line: {} }).line.color);
       Object.assign(layout["yaxis" + end], { overlaying: "y" + under, side: "right", tickmode: "auto", nticks: 6, showgrid: false, tickfont: { color: colour }, linecolor: colour, tickcolor: colour });
@@ -186,7 +202,7 @@ page.draw = (div) => {
     if (panel.title) {
       const pixels = (place.x[1] - place.x[0]) * inner.w;
       notes.push({ text: page.wrapped(panel.title, pixels).text, xref: "paper", yref: "paper", x: place.x[0], y: place.y[1],
-        xanchor: "left", yanchor: "bottom", showarrow: false, align: "left", font: { size: narrow ? 11 : 12.5 } });
+        xanchor: "left", yanchor: "bottom", yshift: page.lift(panel), showarrow: false, align: "left", font: { size: narrow ? 11 : 12.5 } });
     }
     const kept = []; // words of a small chart that leave room for one another: [left, right, low, high] of each [px]
     panel.words.forEach((word) => {
@@ -194,9 +210,9 @@ page.draw = (div) => {
         const along = (value, axis, side) => { const at = axis.log ? Math.log10 : Number, [low, high] = axis.range.map(at);
           return ((at(value) - low) / (high - low)) * side; };
         const across = along(word.x, panel.x, inner.w) + word.shift[0], up = along(word.y, panel.y, inner.h) - word.shift[1];
-        const [wide, tall] = word.angle ? [14, 6.4 * word.text.length] : [6.4 * word.text.length, 12];
+        const [wide, tall] = word.angle ? [14, 6.4 * word.text.length] : [6.4 * word.text.length, 14];
         const begin = across - { left: 0, center: 0.5, right: 1 }[word.align[0]] * wide;
-        const low = up - { bottom: 0, baseline: 0, center: 0.5, top: 1 }[word.align[1]] * tall;
+        const low = word.above ? inner.h : up - { bottom: 0, baseline: 0, center: 0.5, top: 1 }[word.align[1]] * tall;
         const box = [begin, begin + wide, low, low + tall];
         if (box[1] > inner.w + gaps.right) return;
         if (kept.some((other) => box[0] < other[1] && other[0] < box[1] && box[2] < other[3] && other[2] < box[3])) return;
@@ -205,12 +221,20 @@ page.draw = (div) => {
       const align = { center: "center", left: "left", right: "right" }, high = { bottom: "bottom", top: "top", center: "middle", baseline: "bottom" };
       const own = word.paper ? { xref: key.x + " domain", yref: key.y + " domain" } : { xref: key.x, yref: key.y };
       const at = (value, axis) => (axis.log && !word.paper ? Math.log10(value) : value);
+      if (word.above) {
+        const x = at(word.x, panel.x), frame = { xref: key.x, yref: "paper", x0: x, x1: x, opacity: 0.5, line: { color: page.style("--soft"), width: 1 } };
+        shapes.push({ type: "line", layer: "below", ...frame, y0: place.y[0], y1: place.y[1] });
+        notes.push({ text: page.clear(word.text), xref: key.x, yref: "paper", x, y: place.y[1], yshift: 3, showarrow: false, textangle: word.angle,
+          xanchor: "center", yanchor: "bottom", font: { size: 11, color: page.colour(word.color) } });
+        return;
+      }
       notes.push({ text: page.clear(word.text), ...own, x: at(word.x, panel.x), y: at(word.y, panel.y), showarrow: false, textangle: word.angle,
         xanchor: align[word.align[0]], yanchor: high[word.align[1]] || "middle", xshift: word.shift[0], yshift: -word.shift[1],
         font: { size: 11, color: page.colour(word.color) }, bgcolor: word.ground ? page.style("--paper") : undefined });
     });
   });
   layout.annotations = notes;
+  layout.shapes = shapes;
   layout.showlegend = seen.size > 1;
   // room for the lines of a legend beyond the first, before the panels of a small or narrow chart are squeezed to nothing
   const longest = Math.max(0, ...[...seen].map((name) => name.length)), each = Math.max(1, Math.floor((width - 90) / (45 + 6.2 * longest)));

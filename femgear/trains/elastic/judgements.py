@@ -63,7 +63,7 @@ def _noise(results: Any) -> Judgement:
     hertz = order * carrier / (2.0 * np.pi)
     share = 0.5 * (size[line] / level[at]) ** 2 if level[at] > 0.0 else 0.0
     origin = _origin(round(order), results.case.ring.teeth)
-    line_words = f"{hertz:,.0f} Hz, {order:g} times a turn of the carrier"
+    line_words = f"{hertz:,.0f} Hz, {order:g} per carrier turn"
     place = ", ".join(filter(None, (origin, _nearest_mode(results, hertz))))
     main = f"{'its' if share >= _STANDS_OUT else 'no line stands out, the'} largest line, {line_words}"
     main += f" ({place}), makes" if place else ", makes"
