@@ -1,9 +1,9 @@
-"""Teeth that are missing or broken off at their tips, as drawings show them: to which radius each one reaches."""
+"""Faulty teeth as drawings show them: to which radius missing and broken ones reach, and what is said of all."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
 
@@ -14,6 +14,9 @@ if TYPE_CHECKING:
 
 ShortTeeth = tuple[tuple[int, float], ...]
 """Numbers of teeth, counter-clockwise from 0, and the radii that they reach [m]."""
+MarkedTeeth = tuple[tuple[int, str], ...]
+"""Numbers of faulty teeth, counter-clockwise from 0, and what is said of them."""
+_Said = TypeVar("_Said", float, str)
 
 
 def short_teeth(faults: Iterable[ToothFault], gears: GearSet) -> dict[tuple[int, int], ShortTeeth]:
@@ -34,9 +37,22 @@ def short_teeth(faults: Iterable[ToothFault], gears: GearSet) -> dict[tuple[int,
     return {body: tuple(sorted(teeth.items())) for body, teeth in reached.items()}
 
 
-def renumbered(short: ShortTeeth, first: int, teeth: int) -> ShortTeeth:
-    """Count teeth from the one that is number ``first`` of all ``teeth``."""
-    return tuple(sorted(((number - first) % teeth, radius) for number, radius in short))
+def marked_teeth(faults: Iterable[ToothFault], words: Iterable[str]) -> dict[tuple[int, int], MarkedTeeth]:
+    """List faulty teeth with the words of their faults, by the number of the gear and which of its copies has them.
+
+    Faults of all teeth of a gear mark none.
+    """
+    marked: dict[tuple[int, int], dict[int, str]] = {}
+    for fault, text in zip(faults, words, strict=True):
+        if fault.tooth is not None:
+            teeth = marked.setdefault((fault.gear, fault.copy), {})
+            teeth[fault.tooth] = f"{teeth[fault.tooth]}; {text}" if fault.tooth in teeth else text
+    return {body: tuple(sorted(teeth.items())) for body, teeth in marked.items()}
+
+
+def renumbered(teeth: Iterable[tuple[int, _Said]], first: int, count: int) -> tuple[tuple[int, _Said], ...]:
+    """Count teeth from the one that is number ``first`` of all ``count``."""
+    return tuple(sorted(((number - first) % count, what) for number, what in teeth))
 
 
 def without_tips(points: np.ndarray, short: Sequence[tuple[int, float]], count: int, *, internal: bool) -> np.ndarray:

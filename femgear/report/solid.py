@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from femgear.fe.elasticity import Material
     from femgear.gears.gear import Gear
     from femgear.gears.planetary import PlanetarySet
-    from femgear.gears.short_teeth import ShortTeeth
+    from femgear.gears.short_teeth import MarkedTeeth, ShortTeeth
 
 SOLID = "solid.json"
 """File of what the page turns in space."""
@@ -47,6 +47,7 @@ def solid(
     helix_angle: float = 0.0,
     backwards: bool = False,
     short: Mapping[str, ShortTeeth] | None = None,
+    marked: Mapping[str, MarkedTeeth] | None = None,
 ) -> dict[str, Any]:
     """Collect what the browser draws of a set in space.
 
@@ -68,6 +69,8 @@ def solid(
         The right flanks of the sun carry: contact runs along the other lines of action.
     short : mapping, optional
         Teeth that are missing or short by the names of the bodies, as their sectors are counted.
+    marked : mapping, optional
+        Faulty teeth by the names of the bodies, as their sectors are counted, and what is said of them.
 
     Returns
     -------
@@ -90,6 +93,7 @@ def solid(
                 "displacement": packed_values(1e6 * moved[:, sector.nodes]),
                 "stress": packed_values(1e-6 * stress[:, sector.nodes]),
                 "short": [[number, 1e3 * radius] for number, radius in (short or {}).get(body.name, ())],
+                "marked": [list(tooth) for tooth in (marked or {}).get(body.name, ())],
             }
         )
     gears = {gear.name: gear for gear in planetary_set.gears}

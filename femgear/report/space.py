@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from femgear.gears.gear import Gear
-from femgear.gears.short_teeth import ShortTeeth
+from femgear.gears.short_teeth import MarkedTeeth, ShortTeeth
 from femgear.gears.tooth import half_sector
 from femgear.report.solid import packed_values
 
@@ -63,6 +63,8 @@ class SpaceBody:
         x and y [m] of the axis that its own one runs around, and turns of that.
     short : tuple of (int, float)
         Teeth that are missing or short, counter-clockwise from the first one, and the radii that they reach [m].
+    marked : tuple of (int, str)
+        Teeth with a colour of their own, and what stands beside them.
     """
 
     name: str
@@ -81,6 +83,7 @@ class SpaceBody:
     turns: float = 0.0
     orbit: tuple[float, float, float] | None = None
     short: ShortTeeth = ()
+    marked: MarkedTeeth = ()
 
 
 @dataclass(frozen=True)
@@ -118,7 +121,11 @@ def tooth_section(gear: Gear) -> np.ndarray:
 
 
 def space(
-    bodies: Sequence[SpaceBody], members: Sequence[str], place: np.ndarray, motions: Sequence[Motion]
+    bodies: Sequence[SpaceBody],
+    members: Sequence[str],
+    place: np.ndarray,
+    motions: Sequence[Motion],
+    casing: tuple[np.ndarray, np.ndarray] | None = None,
 ) -> dict[str, Any]:
     """Collect what the browser draws of a gearbox in space.
 
@@ -131,6 +138,8 @@ def space(
         [m]
     motions : sequence of Motion
         Views to choose from.
+    casing : ((3,) array, (3,) array), optional
+        Opposite corners of the box that stands for a casing [m].
 
     Returns
     -------
@@ -153,6 +162,7 @@ def space(
             }
             for motion in motions
         ],
+        **({} if casing is None else {"casing": [_lengths(corner) for corner in casing]}),
     }
 
 
@@ -179,5 +189,7 @@ def _body(body: SpaceBody) -> dict[str, Any]:
         data |= {"section": _lengths(body.section), "teeth": body.teeth, "internal": body.internal}
         if body.short:
             data["short"] = [[number, round(1e3 * radius, _DIGITS)] for number, radius in body.short]
+        if body.marked:
+            data["marked"] = [list(tooth) for tooth in body.marked]
         data |= {"twist": round(body.twist, 6), "angle": round(math.remainder(body.angle, 2.0 * math.pi), 6)}
     return data

@@ -5,7 +5,7 @@ from __future__ import annotations
 import cmath
 import json
 import math
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -16,10 +16,11 @@ from femgear.gears.faults import ToothFault
 from femgear.gears.kinematics import orientations
 from femgear.gears.pair import GearSet
 from femgear.gears.profile import base_helix_angle
-from femgear.gears.short_teeth import renumbered, short_teeth
+from femgear.gears.short_teeth import marked_teeth, renumbered, short_teeth
 from femgear.report.solid import SOLID
 from femgear.report.space import SPACE, Motion, SpaceBody, space, tooth_section
 from femgear.stages.protocol import Drawn
+from femgear.stages.tooth_faults import fault_words
 from femgear.storage.files import write_text
 
 WAYS = ("x", "y", "z", "tilt x", "tilt y", "rotation")
@@ -86,7 +87,9 @@ def teeth_zero(gears: GearSet) -> tuple[tuple[int, ...], ...]:
     )
 
 
-def gear_bodies(gears: GearSet, base_helix: float, faults: Iterable[ToothFault] = ()) -> Iterator[SpaceBody]:
+def gear_bodies(
+    gears: GearSet, base_helix: float, faults: Sequence[ToothFault] = (), words: Sequence[str] = ()
+) -> Iterator[SpaceBody]:
     """List the gears of a pair or a set, their axes along z.
 
     Parameters
@@ -95,11 +98,13 @@ def gear_bodies(gears: GearSet, base_helix: float, faults: Iterable[ToothFault] 
         In their transverse section.
     base_helix : float
         Base helix angle of the first gear [rad], positive of a right-handed one.
-    faults : iterable of ToothFault
+    faults : sequence of ToothFault
         Of which teeth that are missing or short are drawn so.
+    words : sequence of str
+        Of these faults, with which their teeth are marked; none marks none.
     """
-    short = short_teeth(faults, gears)
-    zero = teeth_zero(gears) if short else ()
+    short, marked = short_teeth(faults, gears), marked_teeth(faults, words) if words else {}
+    zero = teeth_zero(gears) if short or marked else ()
     hands, angles, turns = gear_hands(gears), tooth_angles(gears), gear_turns(gears)
     for number, gear in enumerate(gears.gears):
         section, half = tooth_section(gear), 0.5 * gear.face_width
@@ -124,13 +129,14 @@ def gear_bodies(gears: GearSet, base_helix: float, faults: Iterable[ToothFault] 
                 gear=gear,
                 turns=turns[number],
                 short=renumbered(short[body], -zero[number][copy - 1], gear.teeth) if body in short else (),
+                marked=renumbered(marked[body], -zero[number][copy - 1], gear.teeth) if body in marked else (),
             )
 
 
 def case_bodies(case: Any) -> Iterator[SpaceBody]:
     """List the gears of the case of a pair or a set."""
     base = base_helix_angle(case.pressure_angle, case.helix_angle or 0.0)
-    return gear_bodies(planetary_set(case), base, set_deviations(case).faults)
+    return gear_bodies(planetary_set(case), base, set_deviations(case).faults, fault_words(case))
 
 
 def write_gears_in_space(drawn: Drawn, folder: Path) -> list[str]:

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -26,10 +26,11 @@ from femgear.contact.tooth_loads import DeformedBody, deformed_set
 from femgear.fe.compliance import mirror_nodes
 from femgear.fe.grid import copy_nodes, rotated_copies
 from femgear.gears.deviations import SetDeviations, loaded_flanks
+from femgear.gears.faults import ToothFault
 from femgear.gears.gear import Gear
 from femgear.gears.modifications import form_deviation
 from femgear.gears.pair import GearSet
-from femgear.gears.short_teeth import ShortTeeth, renumbered, short_teeth, without_tips
+from femgear.gears.short_teeth import marked_teeth, renumbered, short_teeth, without_tips
 from femgear.report.scene import View, assemble_set, deformed_picture, placed, whole_field, write_vtu
 from femgear.report.solid import SOLID, solid
 from femgear.report.style import (
@@ -58,6 +59,7 @@ from femgear.stages.protocol import Drawn, Figures
 from femgear.stages.static import over_width, static_supports
 from femgear.stages.static_results import SIDES, UNEQUAL, StaticResult, peak_to_peak, shares
 from femgear.stages.stress_reasons import largest_pressure
+from femgear.stages.tooth_faults import fault_words
 from femgear.storage.files import write_text
 
 if TYPE_CHECKING:
@@ -687,7 +689,9 @@ def _write_deformed_set(drawn: Drawn, folder: Path) -> list[str]:
     bodies, deformed = [], deformed_set(loaded, sectors, cycle)
     if backwards:
         deformed = [_reflected(body, of_kind[body.kind], order) for body in deformed]
-    short = _short_sectors(static, case, loaded, [body.name for body in deformed])
+    names, faults = [body.name for body in deformed], _drawn_faults(static, case)
+    short = _by_sectors(static, loaded, names, short_teeth(faults, loaded))
+    marked = _by_sectors(static, loaded, names, marked_teeth(faults, fault_words(case)))
     for body in deformed:
         sector = of_kind[body.kind]
         count = sector.gear.teeth
@@ -711,9 +715,12 @@ def _write_deformed_set(drawn: Drawn, folder: Path) -> list[str]:
     if not gears.members:
         return ["deformed_set.vtu", "deformed_set.png"]
     grids = {kind: sector.grid for kind, sector in of_kind.items()}
-    look: Any = {"helix_angle": case.helix_angle or 0.0, "backwards": backwards, "short": short}
+    look: Any = {"helix_angle": case.helix_angle or 0.0, "backwards": backwards, "short": short, "marked": marked}
     materials = dict(zip(grids, materials_of(case), strict=True))
     model = solid(gears, grids, deformed, materials, drawn.data.get("modes"), **look)
+    if "stress" in drawn.data:
+        # at which the colours end [MPa]
+        model["root_stress"] = 1e-6 * float(np.nanmax(drawn.data["stress"]["root_worst"].values))
     write_text(json.dumps(model, allow_nan=False, separators=(",", ":")), folder / SOLID)
     return ["deformed_set.vtu", "deformed_set.png", SOLID]
 
@@ -728,19 +735,28 @@ def _mesh_views(gears: GearSet) -> list[View]:
     return views
 
 
-def _short_sectors(static: StaticResult, case: Case, loaded: GearSet, names: list[str]) -> dict[str, ShortTeeth]:
-    """Find the teeth that are missing or short by the names of the drawn bodies, as their sectors are counted.
+def _drawn_faults(static: StaticResult, case: Case) -> tuple[ToothFault, ...]:
+    """List the faults of the set that is drawn: of a negative torque those of the mirror image, in the same order."""
+    deviations = loaded_image(static.planetary_set, static.sun_torque, set_deviations(case))[2]
+    return () if deviations is None else deviations.faults
+
+
+def _by_sectors(
+    static: StaticResult, loaded: GearSet, names: list[str], teeth: Mapping[tuple[int, int], Any]
+) -> dict[str, Any]:
+    """Order teeth of gears and their copies by the names of the drawn bodies, as their sectors are counted.
 
     Those of a mirror image that is seen from behind are counted the other way round.
     """
-    deviations = loaded_image(static.planetary_set, static.sun_torque, set_deviations(case))[2]
-    found_teeth = short_teeth(() if deviations is None else deviations.faults, loaded)
-    sense, short = 1 if static.sun_torque >= 0 else -1, {}
-    for name, body in zip(names, loaded.bodies, strict=True):
-        teeth = found_teeth.get((body.gear, body.copy), ())
-        numbers = tuple((sense * number, radius) for number, radius in teeth)
-        short[name] = renumbered(numbers, 0, loaded.gears[body.gear].teeth)
-    return short
+    sense = 1 if static.sun_torque >= 0 else -1
+    return {
+        name: renumbered(
+            [(sense * number, what) for number, what in teeth.get((body.gear, body.copy), ())],
+            0,
+            loaded.gears[body.gear].teeth,
+        )
+        for name, body in zip(names, loaded.bodies, strict=True)
+    }
 
 
 def _left_flanks_loaded(

@@ -260,6 +260,27 @@ def test_set_in_space_is_drawn_turns_and_moves(opened):
     assert tab.inner_text("#solid-play") == "Pause"
 
 
+def test_a_faulty_tooth_is_marked_and_named_in_space(opened):
+    tab = opened("cracked_planet")
+    assert tab.locator(".tag").all_inner_texts() == ["planet 1, tooth 3: crack of 1.5 mm"]
+    marked = """() => document.getElementById('solid-place').solid.bodies.flatMap(({ name, faulty, colour }) => {
+        const i = faulty.indexOf(1);
+        return i < 0 ? [] : [[name, faulty.reduce((a, b) => a + b, 0), [...colour.subarray(3 * i, 3 * i + 3)]]]; })"""
+    ((name, points, (red, green, blue)),) = tab.evaluate(marked)
+    assert name == "planet 1" and points > 20 and red > blue > green == 0.0
+
+
+def test_names_of_resonances_stand_above_all_curves(opened):
+    tab = opened(DEMO, unfold=False)
+    tab.wait_for_selector(".front .chart[data-chart=run_up_levels] .annotation-text")
+    above = """() => { const div = document.querySelector('.front .chart[data-chart=run_up_levels]');
+        const top = div.getBoundingClientRect().top + div._fullLayout._size.t;
+        const words = [...div.querySelectorAll('.annotation-text')].filter((one) => one.textContent.includes(' × '));
+        return words.map((one) => top - one.getBoundingClientRect().bottom); }"""
+    room = tab.evaluate(above)
+    assert len(room) > 3 and min(room) > -1.0
+
+
 def test_hover_tells_the_line(opened):
     tab = opened(DEMO)
     tab.select_option("[data-part=source]", "acceleration")

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from femgear.gears.faults import LEFT, BrokenTip, MissingTooth, Wear
-from femgear.gears.short_teeth import renumbered, short_teeth, without_tips
+from femgear.gears.short_teeth import marked_teeth, renumbered, short_teeth, without_tips
 from validation.planetary import reference_set
 
 
@@ -40,6 +40,14 @@ def test_the_worse_of_two_faults_of_a_tooth_is_drawn(gears):
 
 def test_teeth_are_counted_from_another_one():
     assert renumbered(((0, 1.0), (3, 2.0)), 2, 5) == ((1, 2.0), (3, 1.0))
+
+
+def test_faulty_teeth_are_marked_with_all_that_is_said_of_them():
+    wear = Wear(0, 0, None, LEFT, roll=(0.0, 1.0), depth=(1e-6, 1e-6))
+    faults = [MissingTooth(1, 2, 7, None), MissingTooth(1, 2, 3, None), MissingTooth(1, 2, 7, None), wear]
+    marked = marked_teeth(faults, ["a", "b", "c", "all teeth"])
+    assert marked == {(1, 2): ((3, "b"), (7, "a; c"))}
+    assert renumbered(marked[1, 2], 5, 40) == ((2, "a; c"), (38, "b"))
 
 
 def test_tips_of_short_teeth_alone_are_pulled_in():

@@ -67,6 +67,11 @@ def test_bodies_move_in_modes_as_much_as_modes_nc_says(drawn):
             np.testing.assert_allclose(row, 1e3 * (wave @ values).real, atol=1e-3 * np.abs(ring).max() + 1e-9)
 
 
+def test_faulty_teeth_are_marked_on_their_bodies(drawn):
+    bodies = {body["name"]: body["marked"] for body in drawn[1](marked={"planet 2": ((3, "crack"),)})["bodies"]}
+    assert bodies["planet 2"] == [[3, "crack"]] and not bodies["planet 1"] and not bodies["sun"]
+
+
 def test_helical_teeth_turn_along_the_width_by_their_lead(drawn):
     """A lead is pi d / tan(beta): external mates are of opposite hands, the ring of that of its planets."""
     gears, model = drawn

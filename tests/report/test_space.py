@@ -1,6 +1,7 @@
 """Bodies in space for the page: one tooth of a gear, and the arrays of bodies and motions."""
 
 import base64
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -43,4 +44,13 @@ def test_motions_are_those_of_the_stations_in_mm_and_rad():
     (motion,) = model["motions"]
     assert unpacked(motion["moved"]) == pytest.approx(1e3 * values[:, :3].ravel(), abs=1e-6)
     assert unpacked(motion["turned"]) == pytest.approx(values[:, 3:].ravel(), abs=1e-9)
-    assert motion["swings"]
+    assert motion["swings"] and "casing" not in model
+    corners = np.array([-0.1, 0.0, 0.2]), np.array([0.1, 0.2, 0.3])
+    assert space([body], ["a"], place[:1], [], corners)["casing"] == [[-100.0, 0.0, 200.0], [100.0, 200.0, 300.0]]
+
+
+def test_marked_teeth_have_their_words():
+    section = np.array([[0.01, -0.001], [0.011, 0.0], [0.01, 0.001]])
+    body = SpaceBody("sun", "gear", "a", (0.0, 0.0), (0.0, 0.01), ((0.0, 0.01), (0.0, 0.01)), section, 20)
+    drawn = space([replace(body, marked=((3, "crack"),)), body], ["a"], np.zeros((1, 3)), [])["bodies"]
+    assert drawn[0]["marked"] == [[3, "crack"]] and "marked" not in drawn[1]

@@ -100,3 +100,7 @@ def test_short_teeth_are_drawn_in_their_places():
     assert short == ((7 + teeth_zero(gears)[1][1]) % 40, gears.planet.root_radius)
     assert not bodies["planet 1"].short
     assert not bodies["sun"].short
+    # without words no tooth has a mark
+    assert not bodies["planet 2"].marked
+    said = {body.name: body for body in gear_bodies(gears, 0.0, [MissingTooth(1, 1, 7, None)], ["missing"])}
+    assert said["planet 2"].marked == ((short[0], "missing"),) and not said["planet 1"].marked

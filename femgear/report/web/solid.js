@@ -12,6 +12,15 @@ page.solid = () => {
   if (!view) return;
   const { group, render } = view, radius = model.radius, { unpack } = page;
 
+  // points of a sector beyond its root circle, which the cuts between teeth end at
+  const toothOf = ({ points, count, internal }) => {
+    const side = internal ? -1 : 1, polar = Array.from({ length: points.length / 2 }, (_, i) => [side * Math.hypot(points[2 * i], points[2 * i + 1]), Math.atan2(points[2 * i + 1], points[2 * i])]);
+    const cuts = polar.filter(([, angle]) => Math.abs(Math.abs(angle) - Math.PI / count) < 1e-3 / count), root = Math.max(...cuts.map(([radius]) => radius));
+    const tooth = new Set(polar.flatMap(([radius], i) => (radius > root ? [i] : [])));
+    tooth.tip = polar.reduce((best, [radius], i) => (radius > polar[best][0] ? i : best), 0);
+    return tooth;
+  };
+
   // all copies of a sector in the frame of the set: both faces, and walls in layers that turn along the helix
   const LAYER = 0.06;
   const solidOf = (sector, body, field, stress) => {
@@ -55,7 +64,11 @@ page.solid = () => {
     shape.setAttribute("position", new THREE.BufferAttribute(position, 3));
     shape.setAttribute("color", new THREE.BufferAttribute(colour, 3));
     group.add(new THREE.Mesh(shape, new THREE.MeshLambertMaterial({ vertexColors: true, flatShading: true })));
-    return { ...body, rest, field: moved, stress: Float32Array.from(node, (i) => stress[i]), size, nodes: each * count, shape, position, colour };
+    // points of faulty teeth, and the point of each that is farthest from the rim
+    const tooth = toothOf(sector), marked = new Set((body.marked || []).map(([k]) => k));
+    const faulty = Uint8Array.from(node, (i) => marked.has(Math.floor(i / each)) && tooth.has(i % each));
+    const tips = (body.marked || []).map(([k, text]) => ({ text, at: k * each + tooth.tip }));
+    return { ...body, rest, field: moved, stress: Float32Array.from(node, (i) => stress[i]), size, nodes: each * count, shape, position, colour, faulty, tips };
   };
   const bodies = model.bodies.map((body) => solidOf(model.sectors[body.kind], { about: body.centre, ...body }, unpack(body.displacement), unpack(body.stress)));
   // the carrier is seen by its pins, which turn about the centre of the set
@@ -87,7 +100,7 @@ page.solid = () => {
     body.shape.attributes.position.needsUpdate = true;
   };
   const paint = (body, values, largest) => {
-    for (let i = 0; i < body.size; i++) body.colour.set(page.tint(values[i] / largest).map(page.linear), 3 * i);
+    for (let i = 0; i < body.size; i++) body.colour.set((body.faulty[i] ? page.FAULT : page.tint(values[i] / largest)).map(page.linear), 3 * i);
     body.shape.attributes.color.needsUpdate = true;
   };
   const sizes = (field) => Float32Array.from({ length: field.length / 2 }, (_, i) => Math.hypot(field[2 * i], field[2 * i + 1]));
@@ -129,11 +142,13 @@ page.solid = () => {
       state.fields = bodies.map((body) => body.field);
       const values = bodies.map((body, i) => (choice ? sizes(state.fields[i]) : body.stress));
       const all = Float32Array.from(values.flatMap((one, i) => (bodies[i].kind === "pin" ? [] : [...one.subarray(0, bodies[i].nodes)]))).sort(), top = all[all.length - 1];
-      // the stress under a point load has no bound: the colours end where three of ten thousand nodes lie above
-      const largest = (choice ? top : all[Math.floor(0.9997 * all.length)]) || 1;
+      // the stress under a point load has no bound: the colours end at the largest root stress that the verdict has, and without one
+      // where three of ten thousand nodes lie above
+      const ends = model.root_stress || all[Math.floor(0.9997 * all.length)], largest = (choice ? top : ends) || 1;
       bodies.forEach((body, i) => paint(body, values[i], largest));
       const plane = Object.values(model.sectors).some((sector) => sector.twist) ? ", of the transverse section, turned along the helix" : "";
-      legend(choice ? "displacement [µm]" : "von Mises stress [MPa]", `${choice ? "" : "above "}${largest.toPrecision(3)}${plane}`);
+      const end = choice ? largest.toPrecision(3) : model.root_stress ? `${largest.toFixed(0)}, the largest root stress of the mesh period` : `above ${largest.toPrecision(3)}`;
+      legend(choice ? "displacement [µm]" : "von Mises stress [MPa]", `${end}${plane}`);
       state.factor = (0.03 * radius) / Math.max(...state.fields.map((field) => sizes(field).reduce((a, b) => Math.max(a, b), 1e-12)));
     } else {
       state.fields = bodies.map((body) => modal(model.modes[choice - 2], body));
@@ -150,6 +165,7 @@ page.solid = () => {
     bodies.forEach((body, i) => move(body, state.fields[i], state.factor * Number(scale.value) * swing));
     render();
   };
+  bodies.forEach(({ tips, position }) => tips.forEach(({ text, at }) => page.tag(view, text, () => position.subarray(3 * at, 3 * at + 3))));
   page.controls(view, state, { draw, choose });
   choose();
   place.solid = { bodies, state };

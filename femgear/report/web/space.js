@@ -6,12 +6,13 @@ page.space = () => {
   if (!model || !place) return;
   const low = [Infinity, Infinity, Infinity], high = [-Infinity, -Infinity, -Infinity];
   const outer = model.bodies.filter(({ kind }) => kind !== "sensor" && kind !== "foot");
+  if (model.casing) [0, 1, 2].forEach((k) => { low[k] = model.casing[0][k]; high[k] = model.casing[1][k]; });
   outer.forEach(({ axis, ends, radii }) => [0, 1, 2].forEach((k) => {
     const reach = k < 2 ? Math.max(...radii) : 0, at = k < 2 ? [axis[k]] : ends;
     low[k] = Math.min(low[k], ...at.map((one) => one - reach));
     high[k] = Math.max(high[k], ...at.map((one) => one + reach));
   }));
-  const middle = low.map((one, k) => (one + high[k]) / 2), size = Math.hypot(...low.map((one, k) => high[k] - one));
+  const middle = low.map((one, k) => (one + high[k]) / 2), size = (model.casing ? 1.15 : 1) * Math.hypot(...low.map((one, k) => high[k] - one));
   // long boxes from the side, flat ones from the front
   const flat = high[2] - low[2] < 0.5 * Math.max(high[0] - low[0], high[1] - low[1]);
   const view = page.view(place, size / 2, flat ? [0.75, -1.5, 2.7] : [2.35, 1.05, 1.7]);
@@ -80,9 +81,42 @@ page.space = () => {
     shape.setAttribute("position", new THREE.BufferAttribute(at, 3));
     shape.setAttribute("color", new THREE.BufferAttribute(colour, 3));
     group.add(new THREE.Mesh(shape, new THREE.MeshLambertMaterial({ vertexColors: true, flatShading: true })));
-    return { ...body, rest, at, colour, shape, points, stations: own };
+    // vertices of faulty teeth in all layers, and one at the tip of each
+    const of = outline && body.section.length / 2 - 1, marked = body.marked || [], mark = new Uint8Array(points), wallOf = rings[body.internal ? 0 : 1];
+    const tips = marked.map(([k, text]) => {
+      wallOf.forEach((first) => mark.fill(1, first + k * of, first + (k + 1) * of));
+      return { text, vertex: wallOf[layers] + k * of + Math.floor(of / 2) };
+    });
+    return { ...body, rest, at, colour, shape, points, stations: own, mark, tips };
   };
   const bodies = model.bodies.map(bodyOf);
+  bodies.forEach(({ tips, at }) => tips.forEach(({ text, vertex }) => page.tag(view, text, () => at.subarray(3 * vertex, 3 * vertex + 3))));
+
+  // a pale box with edges for a casing, which stands still
+  if (model.casing) {
+    const corners = [0, 1, 2, 3, 4, 5, 6, 7].map((k) => [0, 1, 2].map((axis) => model.casing[(k >> axis) & 1][axis] - middle[axis]));
+    const geometry = (order) => {
+      const shape = new THREE.BufferGeometry();
+      shape.setAttribute("position", new THREE.BufferAttribute(Float32Array.from(order.flatMap((k) => corners[k])), 3));
+      shape.computeVertexNormals();
+      return shape;
+    };
+    const faces = [[0, 1, 3, 2], [4, 5, 7, 6], [0, 1, 5, 4], [2, 3, 7, 6], [0, 2, 6, 4], [1, 3, 7, 5]].flatMap(([a, b, c, d]) => [a, b, c, a, c, d]);
+    const look = { color: 0x6c7680, transparent: true, opacity: 0.13, depthWrite: false, side: 2 };
+    group.add(new THREE.Mesh(geometry(faces), new THREE.MeshLambertMaterial(look)));
+    // edges are thin bars: three.min.js of this page has no lines
+    const bar = 0.0025 * size;
+    const edges = [0, 1, 2].flatMap((axis) => [0, 1, 2, 3, 4, 5, 6, 7].filter((k) => !((k >> axis) & 1)).map((k) => [corners[k], corners[k + (1 << axis)], axis]));
+    edges.forEach(([from, to, axis]) => {
+      const others = [0, 1, 2].filter((one) => one !== axis), points = [];
+      const at = (end, i) => { const point = [...end], turn = (i * Math.PI) / 2; point[others[0]] += bar * Math.cos(turn); point[others[1]] += bar * Math.sin(turn); return point; };
+      for (let i = 0; i < 4; i++) points.push(at(from, i), at(to, i), at(from, i + 1), at(from, i + 1), at(to, i), at(to, i + 1));
+      const shape = new THREE.BufferGeometry();
+      shape.setAttribute("position", new THREE.BufferAttribute(Float32Array.from(points.flat()), 3));
+      shape.computeVertexNormals();
+      group.add(new THREE.Mesh(shape, new THREE.MeshLambertMaterial({ color: 0x6c7680, side: 2 })));
+    });
+  }
 
   // motion of every vertex: of a member of several stations between the two that are next to it along z
   const fieldOf = (body, moved, turned) => {
@@ -113,7 +147,7 @@ page.space = () => {
   if (turning) chooser.add(new Option("turning", "turning"));
   const state = { fields: [], factor: 0, moving: false, swings: false, unit: "" };
   const paint = (body, tintOf) => {
-    for (let i = 0; i < body.points; i++) body.colour.set(tintOf(i).map(page.linear), 3 * i);
+    for (let i = 0; i < body.points; i++) body.colour.set((body.mark[i] ? page.FAULT : tintOf(i)).map(page.linear), 3 * i);
     body.shape.attributes.color.needsUpdate = true;
   };
   const choose = () => {

@@ -25,6 +25,17 @@ page.legend = (bar, text, largest) => {
   bar.append(strip, largest);
 };
 
+// colour of faulty teeth, which is none of stresses, gears and paths of contact
+page.FAULT = [0.85, 0.0, 0.55];
+
+// words in a corner with a line to a point in space, which follows it; at tells where it is
+page.tag = (view, text, at) => {
+  const [line, node] = ["tag-line", "pointed tag"].map((name) => { const one = document.createElement("div"); one.className = name; view.place.append(one); return one; });
+  node.textContent = text;
+  node.style.top = `${6 + 30 * view.tags.length}px`;
+  view.tags.push({ node, line, at });
+};
+
 // null without WebGL; radius is that of what is shown, from the direction in which it is first seen
 page.view = (place, radius, from) => {
   let renderer;
@@ -42,7 +53,17 @@ page.view = (place, radius, from) => {
   const camera = new THREE.PerspectiveCamera(32, 1, radius / 50, radius * 40);
   camera.position.set(...from.map((one) => one * radius));
   const orbit = new THREE.OrbitControls(camera, renderer.domElement);
-  const render = () => renderer.render(scene, camera);
+  const tags = [];
+  const render = () => {
+    renderer.render(scene, camera);
+    const m = camera.projectionMatrix.clone().multiply(camera.matrixWorldInverse).elements, { clientWidth: w, clientHeight: h } = place;
+    tags.forEach(({ node, line, at }) => {
+      const [x, y, z] = at(), depth = m[3] * x + m[7] * y + m[11] * z + m[15];
+      const left = (0.5 + (0.5 * (m[0] * x + m[4] * y + m[8] * z + m[12])) / depth) * w, top = (0.5 - (0.5 * (m[1] * x + m[5] * y + m[9] * z + m[13])) / depth) * h;
+      const from = [node.offsetLeft + node.offsetWidth, node.offsetTop + 0.5 * node.offsetHeight], across = left - from[0], down = top - from[1];
+      Object.assign(line.style, { left: `${from[0]}px`, top: `${from[1]}px`, width: `${Math.hypot(across, down)}px`, transform: `rotate(${Math.atan2(down, across)}rad)` });
+    });
+  };
   orbit.addEventListener("change", render);
   renderer.domElement.addEventListener("keydown", (event) => {
     const step = { ArrowLeft: [0.1, 0], ArrowRight: [-0.1, 0], ArrowUp: [0, 0.1], ArrowDown: [0, -0.1] }[event.key];
@@ -83,7 +104,7 @@ page.view = (place, radius, from) => {
   });
   // a browser has few of these, so one that is not needed any more is given back
   const dispose = () => { renderer.dispose(); renderer.forceContextLoss(); renderer.domElement.remove(); };
-  return { group, camera, orbit, render, reset, dispose, canvas: renderer.domElement };
+  return { group, camera, orbit, render, reset, dispose, place, tags, canvas: renderer.domElement };
 };
 
 // choice, motion, magnification and reset of a view, whose state tells whether it is moving

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -59,7 +59,7 @@ def write_space(drawn: Drawn, folder: Path) -> list[str]:
     bodies = [*gearbox_bodies(drawn.case, dict(zip(stations, place, strict=True))), *_marks(deflection)]
     if not bodies:
         return []
-    model = space(bodies, carriers, place, motions)
+    model = space(bodies, carriers, place, motions, None if drawn.case.casing is None else _casing_box(bodies))
     write_text(json.dumps(model, allow_nan=False, separators=(",", ":")), folder / SPACE)
     return [SPACE]
 
@@ -129,6 +129,19 @@ def _marks(data: Any) -> Iterator[SpaceBody]:
             for name, (x, y, z) in zip(data[kind].values, data[f"{kind}_place"].values, strict=True):
                 radii, ends = (0.0, 0.5 * size), (z - 0.5 * size, z + 0.5 * size)
                 yield SpaceBody(f"{kind} {name}", kind, CASING, (x, y), ends, (radii, radii))
+
+
+def _casing_box(bodies: Sequence[SpaceBody]) -> tuple[np.ndarray, np.ndarray]:
+    """Box that stands for a casing, whose shape no case has: around its gears, bearings, feet and sensors [m]."""
+    corners = list[tuple[float, float, float]]()
+    for body in bodies:
+        if body.kind != "shaft":
+            reach = max(map(max, body.radii)) if body.kind in ("gear", "bearing") else 0.0
+            x, y = body.axis
+            middle = 0.5 * sum(body.ends)
+            ends = body.ends if body.kind in ("gear", "bearing") else (middle, middle)
+            corners += [(x - reach, y - reach, min(ends)), (x + reach, y + reach, max(ends))]
+    return np.min(corners, axis=0), np.max(corners, axis=0)
 
 
 def _of_shaft(shaft: BoxShaftSection) -> Iterator[SpaceBody]:

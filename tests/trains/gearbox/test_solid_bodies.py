@@ -9,9 +9,10 @@ import pytest
 from casings import answer_in_a_casing
 from matplotlib.path import Path as Outline
 
-from femgear.report.space import SPACE
+from femgear.report.space import SPACE, SpaceBody
 from femgear.stages.protocol import Drawn
-from femgear.trains.gearbox.solid_bodies import gearbox_bodies, write_space
+from femgear.trains.gearbox.case_file import CASING
+from femgear.trains.gearbox.solid_bodies import _casing_box, gearbox_bodies, write_space
 from femgear.trains.reading import read_case, with_value
 
 pytestmark = pytest.mark.usefixtures("coarse_states")
@@ -85,6 +86,15 @@ def test_motions_are_deflections_and_modes_of_the_run(tmp_path):
     movers = {body["member"] for body in model["bodies"]}
     assert movers <= model["members"].keys()
     assert write_space(Drawn(answer.case, {}), tmp_path) == []
+
+
+def test_the_box_of_a_casing_holds_gears_feet_and_sensors():
+    gear = SpaceBody("gear", "gear", "a", (0.1, 0.0), (0.0, 0.02), ((0.0, 0.05), (0.0, 0.05)))
+    foot = SpaceBody("foot", "foot", CASING, (-0.1, -0.2), (0.09, 0.11), ((0.0, 0.01), (0.0, 0.01)))
+    # shafts stand out of it
+    shaft = SpaceBody("shaft", "shaft", "a", (0.1, 0.0), (-1.0, 1.0), ((0.0, 0.01), (0.0, 0.01)))
+    low, high = _casing_box([gear, foot, shaft])
+    assert low == pytest.approx([-0.1, -0.2, 0.0]) and high == pytest.approx([0.15, 0.05, 0.1])
 
 
 def test_teeth_roll_on_one_another(axle):
