@@ -264,7 +264,11 @@ def report(
 
 
 @app.command
-def compare(*runs: Path, output: Annotated[Path, Parameter(name=("--output", "-o"))]) -> int:
+def compare(
+    *runs: Path,
+    output: Annotated[Path, Parameter(name=("--output", "-o"))],
+    verbose: Annotated[bool, Parameter(negative="")] = False,
+) -> int:
     """Compare runs: entries of the cases and numbers that differ, modes of one shape, curves over each other, sounds.
 
     Parameters
@@ -273,8 +277,10 @@ def compare(*runs: Path, output: Annotated[Path, Parameter(name=("--output", "-o
         Two or more folders that femgear run wrote, of cases of one kind; all are compared with the first.
     output
         Folder of the page compare.html.
+    verbose
+        Print all tables with all rows.
     """
-    from femgear.report.compare import compare_page, compared
+    from femgear.report.compare import compare_page, compared, in_brief
     from femgear.storage.files import own_files, write_text
     from femgear.trains.reading import open_results
     from femgear.trains.registry import same_train
@@ -285,7 +291,8 @@ def compare(*runs: Path, output: Annotated[Path, Parameter(name=("--output", "-o
     opened = [open_results(folder) for folder in runs]
     train = same_train(opened)
     own_files(output, ["compare.html"])
-    print_blocks(compared(train, *opened))
+    blocks = compared(train, *opened)
+    print_blocks(blocks if verbose else in_brief(blocks))
     write_text(compare_page(train, *opened), output / "compare.html")
     say(f"page: {output / 'compare.html'}")
     return 0

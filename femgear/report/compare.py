@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from femgear.report.page import chart_figure, document, folded, part_of, shown_data, table
-from femgear.report.tables import MARKS, WARNINGS, Block, is_bound, unmarked
+from femgear.report.tables import MARKS, WARNINGS, Block, is_bound, merged_names, unmarked
 
 if TYPE_CHECKING:
     from femgear.stages.judgements import Judgement
@@ -25,8 +25,14 @@ ANSWERS = "Page one of all"
 """Title of the table of what page one answers."""
 MODES = "Modes matched by shape"
 """Title of the table of modes."""
-OPEN = ANSWERS, "Key figures", "Cases"
+OPERATION = "What they do"
+"""Title of the table of torques and speeds."""
+OPEN = OPERATION, ANSWERS, "Key figures", "Cases", "Verdict"
 """Titles of the tables that are not folded away."""
+_MOST_ROWS = 10
+"""Rows that a terminal shows of a table."""
+_LEFT_OUT = "published"
+"""Part of the names of entries that only name what results are set beside."""
 _NUMBERS = ("first", "second", "third")
 """Names of runs where nothing else tells them apart."""
 _MEETING = ("operating [rpm]", "mode", "kind", "mesh harmonic")
@@ -57,19 +63,59 @@ def names_of(runs: Sequence[Results]) -> list[str]:
 
 
 def compared(train: Train, *runs: Results) -> tuple[Block, ...]:
-    """Tabulate runs of one train: what page one answers of all, then entries and numbers that differ.
+    """Tabulate runs of one train: what they do, what page one answers of all, then entries and numbers that differ.
 
     Changes are those against the first run.
     """
     names = names_of(runs)
     rows = tuple(_entries(*((run.case.source, run.case.model_dump(by_alias=True)) for run in runs)))
-    entries = Block("Cases", ("entry", *names) if rows else (), rows, () if rows else ("the same",))
-    blocks = [*_answers(train, runs, names), *_key_figures(train, runs, names), entries]
+    blocks = [*_operation(train, runs, names, rows), *_answers(train, runs, names), *_key_figures(train, runs, names)]
+    blocks.append(_differing_entries(rows, names))
     described = [{block.title: block for block in train.verdict(run)} | train.describe_stages(run) for run in runs]
     for title in described[0]:
         if all(title in tables for tables in described):
             blocks.append(_differences(*(tables[title] for tables in described), names=names))
     return (*blocks, *_matched_modes(runs, names), _findings(runs, names))
+
+
+def in_brief(blocks: Sequence[Block]) -> tuple[Block, ...]:
+    """Choose what a terminal shows of the tables of `compared`: those that are not folded away, of few rows each."""
+    shown = [
+        replace(block, rows=block.rows[:_MOST_ROWS], notes=_with_rest(block)) for block in blocks if block.title in OPEN
+    ]
+    others = [block.title for block in blocks if block.title not in OPEN and block.rows]
+    more = f"by --verbose and on the page: {', '.join(others)}" if others else ""
+    return (*shown, Block("More that differs", notes=(more,))) if more else tuple(shown)
+
+
+def _with_rest(block: Block) -> tuple[str, ...]:
+    """Notes of a table, and how many rows of it a terminal does not show."""
+    rest = len(block.rows) - _MOST_ROWS
+    return (*block.notes, f"{rest} more rows by --verbose and on the page") if rest > 0 else block.notes
+
+
+def _operation(
+    train: Train, runs: Sequence[Results], names: Sequence[str], entries: Sequence[tuple[str, ...]]
+) -> Iterator[Block]:
+    """Tabulate torques, speeds and powers of runs that do not do the same; ``entries`` are those that differ."""
+    duties = [train.duty(run.case) for run in runs]
+    loads = [key for key, *_ in entries if _is_load(key)]
+    if loads or len({*duties}) > 1:
+        note = f"{merged_names(loads)} differ: forces, levels and lives do by that alone" if loads else ""
+        yield Block(OPERATION, ("", *names), (("operation", *duties),), (note,) if note else ())
+
+
+def _is_load(key: str) -> bool:
+    """Tell whether an entry is a torque or a speed of operation, by the section and the end of its name."""
+    return key.startswith("operation.") and any(part in key for part in (".torque", ".speed", ".power"))
+
+
+def _differing_entries(rows: Sequence[tuple[str, ...]], names: Sequence[str]) -> Block:
+    """Tabulate entries that differ, those of the operation first and the title last."""
+    kept = [row for row in rows if _LEFT_OUT not in row[0]]
+    kept.sort(key=lambda row: (row[0] == "title", not row[0].startswith("operation.")))
+    notes = [f"{len(rows) - len(kept)} entries of published values that differ are left out"] * (len(kept) < len(rows))
+    return Block("Cases", ("entry", *names) if kept else (), tuple(kept), tuple(notes if rows else ["the same"]))
 
 
 def _name(number: int) -> str:
@@ -92,7 +138,7 @@ def _answer(judgement: Judgement) -> str:
 
 
 def _key_figures(train: Train, runs: Sequence[Results], names: Sequence[str]) -> Iterator[Block]:
-    """Tabulate the key figures of all runs with their changes: of the whole, and of parts that change."""
+    """Tabulate the key figures of all runs, those of the whole and of parts that change: the largest changes first."""
     of_runs = [{figure.name: figure for figure in train.key_figures(run.case)} for run in runs]
     if not any(of_runs):
         return
@@ -109,10 +155,12 @@ def _key_figures(train: Train, runs: Sequence[Results], names: Sequence[str]) ->
         changes = ["" if equal else figure.change(first, x) for x, equal in zip(others, alike, strict=True)]
         shown = chain.from_iterable(zip(map(figure.show, others), changes, strict=True))
         unit = f" [{figure.dimension.shown}]".replace(" [1]", "")
-        rows.append((f"{name}{unit}", figure.show(first), *shown))
+        size = max(figure.relative_change(first, x) for x in others)
+        rows.append((not figure.whole, -size, (f"{name}{unit}", figure.show(first), *shown)))
     notes = (f"{same} figures of parts change by less than {_LEAST_CHANGE:.1%}",) if same else ()
     if rows or same:
-        yield Block("Key figures", ("figure", *_with_changes(names)), tuple(rows), notes)
+        rows.sort(key=lambda row: row[:2])
+        yield Block("Key figures", ("figure", *_with_changes(names)), tuple(row[-1] for row in rows), notes)
 
 
 def _with_changes(names: Sequence[str]) -> tuple[str, ...]:
@@ -285,8 +333,10 @@ def _differences(*blocks: Block, names: Sequence[str] = ()) -> Block:
     keys = dict.fromkeys(chain.from_iterable(tables))
     alone = {key for key in keys if not all(key in table_of_run for table_of_run in tables)}
     whole = all(len(rows_of) == len(block.rows) for rows_of, block in zip(tables, blocks, strict=True))
-    if any(block.header != header for block in blocks) or not whole or (alone and not meeting):
+    if any(block.header != header for block in blocks) or not whole or len(alone) == len(keys) > 0:
         return Block(title, notes=("the tables have other rows; see the reports",))
+    if not meeting:
+        keys = {key: None for key in keys if key not in alone}
     rows, columns = [], header or [""] * max(map(len, blocks[0].rows), default=0)
     for key in keys:
         what = ", ".join(f"{columns[i]} {text}".strip() for i, text in zip(key_columns, key))
@@ -300,13 +350,18 @@ def _differences(*blocks: Block, names: Sequence[str] = ()) -> Block:
                 others = ((cell, _change(cells[0], cell, decibels=decibels)) for cell in cells[1:])
                 rows.append((what, columns[i], cells[0], *chain.from_iterable(others)))
     shown_header = ("row", "column", *_with_changes(names)) if rows else ()
-    return Block(title, shown_header, tuple(rows), tuple(_notes(rows, blocks, names)))
+    other_rows = [", ".join(key) for key in alone] if not meeting else []
+    return Block(title, shown_header, tuple(rows), tuple(_notes(rows, blocks, names, other_rows)))
 
 
-def _notes(rows: Sequence[tuple[str, ...]], blocks: Sequence[Block], names: Sequence[str]) -> Iterator[str]:
-    """Say under a table of differences what its numbers cannot."""
+def _notes(
+    rows: Sequence[tuple[str, ...]], blocks: Sequence[Block], names: Sequence[str], other_rows: Sequence[str]
+) -> Iterator[str]:
+    """Say under a table of differences what its numbers cannot; ``other_rows`` are those that not all runs have."""
     if not rows:
         yield "the same"
+    if other_rows:
+        yield f"rows that not all runs have: {', '.join(sorted(other_rows))}"
     ends = [list(map(float, row[2:3] + row[3::2])) for row in rows if row[1].startswith(_EXCITED)]
     if any(max(values) - min(values) > 0.05 * values[0] for values in ends):
         yield (

@@ -120,6 +120,12 @@ class KeyFigure:
             return f"{second - first:+.2f} dB"
         return f"{100.0 * (second / first - 1.0):+.3g} %" if first and math.isfinite(second / first) else ""
 
+    def relative_change(self, first: float, second: float) -> float:
+        """Size of the change from the first value to the second [SI] over the first, of levels of their amplitudes."""
+        if self.dimension.si == DECIBEL.si:
+            first, second = 1.0, 10.0 ** ((second - first) / 20.0)
+        return abs(second / first - 1.0) if first and math.isfinite(second / first) else 0.0
+
 
 def figure_of(figures: Iterable[KeyFigure], words: str) -> KeyFigure | None:
     """Find a figure by its name: as it is written, else whatever letters are large; None where there is none."""

@@ -361,7 +361,24 @@ def _left_out(case: Any, given: Mapping[str, Any]) -> Iterator[Finding]:
         if there:
             text = f"{key} has no place in a gearbox of one stage"
             if key == "operation.speeds":
-                text = "of operation.speeds the first one is that of the load case"
-                if case.operation.load_case:
-                    text = "operation.speeds have no place in a gearbox, whose speeds are those of load cases"
+                yield _one_speed_of(case.operation, "runup" in given)
+                continue
             yield Finding("W-UNUSED", key, text)
+
+
+def _one_speed_of(operation: Any, has_run_up: bool) -> Finding:
+    """Say which of several speeds the gearbox has, and what gives levels at the others."""
+    if operation.load_case:
+        text = "operation.speeds have no place in a gearbox, whose speeds are those of load cases"
+        return Finding("W-UNUSED", "operation.speeds", text)
+    low, high = (
+        f"{abs(speed) / RPM:.6g} rpm" for speed in sorted(operation.speeds, key=abs)[:: len(operation.speeds) - 1]
+    )
+    first = f"{operation.speeds[0] / RPM:.6g} rpm"
+    text = f"a load case has one speed: the first one, {first}, of {len(operation.speeds)} from {low} to {high}"
+    remedy = (
+        "its [runup] has the others"
+        if has_run_up
+        else f'for the others give [runup] with from = "{low}", to = "{high}"'
+    )
+    return Finding("W-UNUSED", "operation.speeds", text, remedy=f"{remedy}; or change operation.load_case[0].speed")

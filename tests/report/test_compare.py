@@ -56,8 +56,11 @@ def test_cells_that_differ_come_with_their_change():
     found = compare._differences(first, second)
     assert found.rows == (("mesh a", "STE", "2.0", "2.5", "+25 %"), ("mesh a", "form", "x", "y", ""))
     assert compare._differences(first, first).notes == ("the same",)
-    other = Block("Static", ("mesh", "STE"), (("a", "2.0"),))
+    other = Block("Static", ("mesh", "STE"), (("c", "2.0"),))
     assert "other rows" in compare._differences(first, other).notes[0]
+    part = compare._differences(first, Block("Static", ("mesh", "STE", "form"), (("a", "2.5", "x"), ("c", "9", "x"))))
+    assert part.rows == (("mesh a", "STE", "2.0", "2.5", "+25 %"),)
+    assert part.notes == ("rows that not all runs have: b, c",)
     wider = Block("Static", ("mesh", "one way", "STE"), (("a", "9", "2.5"), ("b", "9", "1.0")))
     shared = ("mesh a", "STE", "2.0", "2.5", "+25 %")
     assert compare._differences(first, wider).rows == (shared,)
@@ -154,6 +157,36 @@ def test_key_figures_of_two_runs_are_compared_by_name(tmp_path):
     again = {row[0]: row[1:] for row in three["Key figures"].rows}
     assert again["misalignment [um]"] == (shown, other, change, shown, "")
     assert compare.compare_page(train_of(case), *runs).count("<table>") >= 4
+
+
+def test_runs_under_other_loads_say_so_first(tmp_path):
+    case, runs = read_case(pair_tables()), []
+    for name, changed in (("a", case), ("b", with_value(case, "operation.load_case[0].speed", {"input": "900 rpm"}))):
+        with run_folder(tmp_path / name) as place:
+            run_case(changed, place, only="deflection", pictures=False)
+        runs.append(open_results(tmp_path / name))
+    first, *others = compare.compared(train_of(case), *runs)
+    assert first.title == compare.OPERATION and first.rows[0][1:] == tuple(train_of(case).duty(r.case) for r in runs)
+    assert first.notes == ("operation.load_case[0].speed.input differ: forces, levels and lives do by that alone",)
+    alone = compare.compared(train_of(case), runs[0], runs[0])
+    assert all(block.title != compare.OPERATION for block in alone) and others[0].title == compare.ANSWERS
+
+
+def test_entries_that_differ_begin_with_the_operation_and_leave_out_published_values():
+    rows = (("a.b", "1", "2"), ("housing.published[0].speed", "1", "2"), ("operation.torque", "1", "2"))
+    block = compare._differing_entries((("title", "x", "y"), *rows), ("one", "two"))
+    assert [row[0] for row in block.rows] == ["operation.torque", "a.b", "title"]
+    assert block.notes == ("1 entries of published values that differ are left out",)
+    assert compare._differing_entries((), ("one", "two")).notes == ("the same",)
+
+
+def test_a_terminal_shows_few_rows_of_the_tables_that_decide():
+    rows = tuple((f"{number}", "1") for number in range(12))
+    tables = Block("Key figures", ("figure", "one"), rows), Block("Static", ("mesh", "STE"), rows[:1]), Block("Modes")
+    figures, more = compare.in_brief(tables)
+    assert figures.rows == rows[:10] and figures.notes == ("2 more rows by --verbose and on the page",)
+    assert more.notes == ("by --verbose and on the page: Static",)
+    assert compare.in_brief(tables[2:]) == ()
 
 
 def test_three_tables_are_compared_with_the_first():

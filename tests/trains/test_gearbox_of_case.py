@@ -136,3 +136,13 @@ def test_lives_of_a_pair_are_those_of_its_gearbox():
     for name in ("root_life", "flank_life", "root_equivalent_torque", "flank_damage_share"):
         np.testing.assert_allclose(box[name], alone[name], rtol=1e-6)
     assert np.isfinite(alone["flank_life"].values[0])
+
+
+def test_what_several_speeds_become_is_said_with_what_gives_the_others():
+    case = with_values(read_case("cases/planetary_27_40_108.toml"), {"operation.speeds": ["250 rpm", "3100 rpm"]})
+    (speeds,) = (finding for finding in gearbox_of_case(case).findings if finding.key == "operation.speeds")
+    assert speeds.text == "a load case has one speed: the first one, 250 rpm, of 2 from 250 rpm to 3100 rpm"
+    assert speeds.remedy.startswith('for the others give [runup] with from = "250 rpm", to = "3100 rpm"; or change ')
+    swept = gearbox_of_case(with_values(case, {"runup": {"from": "250 rpm", "to": "3100 rpm"}})).findings
+    (speeds,) = (finding for finding in swept if finding.key == "operation.speeds")
+    assert speeds.remedy.startswith("its [runup] has the others")

@@ -17,7 +17,7 @@ from femgear.case.quantities import LENGTH, RPM
 from femgear.errors import GeometryError
 from femgear.findings import DOUBT, FAULT, Finding
 from femgear.gears.checks import check_meshes
-from femgear.gears.planetary import assembly_positions
+from femgear.gears.planetary import assembly_positions, feasible_angles
 from femgear.report.tables import Block, describe_modes, tabulate
 from femgear.stages.life_results import describe_damage, describe_life, life_findings
 from femgear.stages.planet_bearings import describe_planet_bearings, planet_bearing_findings
@@ -35,7 +35,7 @@ from femgear.trains.gearbox.casing_results import (
     describe_feet,
 )
 from femgear.trains.gearbox.deflection import Deflection
-from femgear.trains.gearbox.geometry import planet_distance, planet_radius, set_sizes
+from femgear.trains.gearbox.geometry import StageSizes, planet_distance, planet_radius, set_sizes
 from femgear.trains.gearbox.life import bearing_life_findings, describe_load_cases, life_text, life_variables
 from femgear.trains.gearbox.model import (
     GearboxModel,
@@ -692,8 +692,7 @@ def _given_planets(case: GearboxCase) -> Iterator[Finding]:
         try:
             assembly_positions(sizes.teeth[0], sizes.teeth[2], sizes.planet_angles)
         except GeometryError as error:
-            limit, remedy = error.limit or "", error.remedy or ""
-            key = f"planetary[{i}].gears"
+            limit, remedy, key = error.limit or "", _assembly_remedy(sizes), f"planetary[{i}].gears"
             yield Finding("W-TEETH", key, error.message, limit=limit, remedy=remedy, severity=DOUBT)
         room, module = planet_distance(sizes), 2.0 * planet_radius(sizes) / sizes.teeth[1]
         left = room - 2.0 * (planet_radius(sizes) + module)
@@ -706,6 +705,16 @@ def _given_planets(case: GearboxCase) -> Iterator[Finding]:
                 remedy = "take fewer planets, or smaller ones"
             options = {"limit": ">= one module", "severity": severity, "remedy": remedy}
             yield Finding("W-NEIGHBOURS", f"planetary[{i}].gears", text, **options)
+
+
+def _assembly_remedy(sizes: StageSizes) -> str:
+    """Say how many planets assemble equally spaced beside one another, and at which angles those that are given do."""
+    total, module = sizes.teeth[0] + sizes.teeth[2], 2.0 * planet_radius(sizes) / sizes.teeth[1]
+    least = 2.0 * planet_radius(sizes) + 3.0 * module
+    counts = [n for n in range(3, 13) if total % n == 0 and 2.0 * sizes.centre_distance * math.sin(math.pi / n) > least]
+    equal = f"take planets = {' or '.join(map(str, counts))}, which are equally spaced, or " if counts else ""
+    angles = ", ".join(f'"{math.degrees(angle):.10g} deg"' for angle in feasible_angles(total, sizes.planet_angles))
+    return f"{equal}give planet_angles = [{angles}], the nearest that fit; [balance] takes equal spacing alone"
 
 
 _HOLDS = ("support_stiffness", "bearing_stiffness", "tilt_stiffness", "foundation_radial", "foundation_tangential")

@@ -177,7 +177,10 @@ def test_planets_that_do_not_assemble_are_told():
     findings = list(gearbox_warnings(read_case(tables)))
     # 120 teeth over 7 planets; and 2 x 45 mm sin(180 deg / 7) less two tip radii of 19.5 mm
     assert [one.code for one in findings] == ["W-TEETH", "W-NEIGHBOURS"]
-    assert "(z_s + z_r)/N = 17.1429" in findings[0].text and "nearest planet_angles" in findings[0].remedy
+    assert "(z_s + z_r)/N = 17.1429" in findings[0].text and "nearest that fit" in findings[0].remedy
+    # 120 teeth over 3 to 6 planets are whole, and 8 of them have no room
+    assert findings[0].remedy.startswith("take planets = 3 or 4 or 5 or 6, which")
+    assert 'planet_angles = ["0 deg", "51 deg", "102 deg", "153 deg", ' in findings[0].remedy
     assert "0.04954 mm apart" in findings[1].text
     tables["planetary"][0]["gears"]["planets"] = 4
     assert not list(gearbox_warnings(read_case(tables)))
