@@ -62,11 +62,11 @@ def _noise(results: Any) -> Judgement:
     order = float(orders[line])
     hertz = order * carrier / (2.0 * np.pi)
     share = 0.5 * (size[line] / level[at]) ** 2 if level[at] > 0.0 else 0.0
-    origin = _origin(round(order), results.case.ring.teeth)
-    line_words = f"{hertz:,.0f} Hz, {order:g} per carrier turn"
+    origin = _origin(round(order), results.case.ring.teeth) or f"{order:g} per carrier turn"
     place = ", ".join(filter(None, (origin, _nearest_mode(results, hertz))))
-    main = f"{'its' if share >= _STANDS_OUT else 'no line stands out, the'} largest line, {line_words}"
-    main += f" ({place}), makes" if place else ", makes"
+    main = (
+        f"{'its' if share >= _STANDS_OUT else 'no line stands out, the'} largest line, {hertz:,.0f} Hz ({place}), makes"
+    )
     main += f" {share:.0%} of the power"
     sentence = f"At {speed:,.4g} rpm the housing has {_bound_in_words(size_words)}: {main}"
     if decisive := most_decisive(results):
@@ -77,7 +77,7 @@ def _noise(results: Any) -> Judgement:
         sentence += f". Loudest of the run-up: {_bound_in_words(levels[-1])}"
         resonance = _resonance(results.runup)
     elif "modes" in results.stages:
-        resonance = resonance_of_line(line_words, hertz, results.modes["frequency"].values, share)
+        resonance = resonance_of_line(f"{origin} at {hertz:,.0f} Hz", hertz, results.modes["frequency"].values, share)
     # a bound has no mark: it is one itself
     doubts = [*([CATALOGUE["W-EXCITATION"].words] if any(map(is_bound, levels)) else []), *marks.words]
     rests_on = estimates_words(results.findings)

@@ -66,10 +66,7 @@ def judged(results):
 
 def test_the_main_line_is_that_of_the_acceleration_with_its_mode(results):
     noise = judged(results)
-    assert (
-        "its largest line, 2,160 Hz, 216 per carrier turn (mesh harmonic 2, near mode 2: ring), makes 80% of"
-        in noise.sentence
-    )
+    assert "its largest line, 2,160 Hz (mesh harmonic 2, near mode 2: ring), makes 80% of" in noise.sentence
     assert noise.sentence.endswith("Loudest of the run-up: 9 m/s² at 4,000 rpm, the end of its range")
     assert noise.answer == "3.162 m/s² at 3,000 rpm"
 
@@ -112,7 +109,7 @@ def test_a_set_without_a_run_up_is_judged_by_its_largest_line(results):
     mode = int(np.abs(results.modes["frequency"].values - hertz).argmin())
     results.modes["frequency"].values[mode] = 1.02 * hertz
     apart = f"2.0 % below mode {mode + 1} at 2,203 Hz"
-    words = f"2,160 Hz, 216 per carrier turn, {apart}, makes 80% of the power"
+    words = f"mesh harmonic 2 at 2,160 Hz, {apart}, makes 80% of the power"
     assert (judged(results).state, judged(results).limit) == ("look", words)
 
 
@@ -145,7 +142,4 @@ def test_no_line_stands_out_of_many_and_a_far_mode_is_not_named(results):
     results.housing["level"][:] = 12.0
     results.modes["frequency"].values[1] = 2500.0
     sentence = judged(results).sentence
-    assert (
-        "no line stands out, the largest line, 2,160 Hz, 216 per carrier turn (mesh harmonic 2), makes 6% of"
-        in sentence
-    )
+    assert "no line stands out, the largest line, 2,160 Hz (mesh harmonic 2), makes 6% of" in sentence
