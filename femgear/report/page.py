@@ -57,7 +57,7 @@ _WORDS_ROOM = 2200
 gears and charts below are drawn smaller."""
 _CAPTION = 100
 """Most characters of a note on the gears that stands below them on page one."""
-POINTER = "The pointer names them. "
+POINTER = "The pointer names parts. "
 """What is said of parts in space on a screen."""
 _BODIES = {"gear": "gears", "shaft": "shafts", "bearing": "bearings"}
 _BODIES |= {"sensor": "sensors (red)", "foot": "feet (black)"}
@@ -276,8 +276,8 @@ def _caption(gears: Sequence[Block], data) -> tuple[str, str] | None:
         return None
     kinds = {body["kind"] for body in data["space"]["bodies"]}
     words = [words for kind, words in _BODIES.items() if kind in kinds]
-    box = " The pale box stands for the casing, whose shape the case does not have." * ("casing" in data["space"])
-    return f"{' and '.join(', '.join(words).rsplit(', ', 1)).capitalize()}.{box}", POINTER
+    box = "; the pale box stands for the casing, whose shape the case does not have" * ("casing" in data["space"])
+    return f"{' and '.join(', '.join(words).rsplit(', ', 1)).capitalize()}{box}.", POINTER
 
 
 def _front_places(train: Train, charts) -> list[tuple[str, int]]:

@@ -322,7 +322,7 @@ def test_long_legends_leave_room_for_their_charts(opened):
     assert (
         tab.locator(".front figcaption")
         .inner_text()
-        .endswith("The pointer names them. Drag or use arrow keys to turn.")
+        .endswith("The pointer names parts. Drag or use arrow keys to turn.")
     )
     # no hand moves over paper
     tab.evaluate("dispatchEvent(new Event('beforeprint'))")

@@ -29,6 +29,8 @@ if TYPE_CHECKING:
 _ARROW = 46.0  # length of the longest arrow [points]
 _HEAD = 9.0  # length of its head [points]
 _BESIDE = 6.0  # distance of a name beside its arrow [points]
+_ABOVE_LINES = 1.3
+"""Height of a Campbell diagram over the highest frequency that a line of excitation has in it."""
 _NAME_HEIGHT = 0.035  # of the names of lines of excitation, over that of the picture
 _STEP, _MOST_STEPS = 4.0, 60  # by which names are pushed on [points], and how often
 _NEAR = 16  # first places of a name, which are near enough to its arrow to leave a curve for
@@ -209,11 +211,17 @@ def gearbox_campbell(modes: xr.Dataset) -> Figure:
     """Draw natural frequencies over the speed with turns and mesh lines of all stages, from modes.nc.
 
     Branches have the colour of the kind of their mode at rest; lines of excitation have their names at their ends.
+    Modes that no line of excitation comes near are left out, and counted in the title.
     """
     speed, frequency = modes["campbell_speed"].values, modes["campbell_frequency"].values
     kinds, hertz = modes["kind"].values, modes["frequency"].values
     figure, (ax,) = new_figure(width=9.5, height=6.0)
+    reached = _ABOVE_LINES * float(modes["order"].values.max(initial=0.0)) / 60.0 * float(speed.max())
     top = 1.05 * float(np.nanmax(frequency, initial=1.0))
+    beyond = int((hertz > reached).sum())
+    if beyond and (hertz[hertz > 0.0] <= reached).any():
+        top = min(top, reached)
+    words = f"{beyond} mode{'s' * (beyond > 1)} above, which no line comes near" if beyond and top == reached else ""
     for branch in frequency.T:
         start = branch[np.isfinite(branch)][:1]
         if not len(start) or start[0] <= 0.0:
@@ -237,7 +245,7 @@ def gearbox_campbell(modes: xr.Dataset) -> Figure:
         ax.axvline(at, color=BLACK, linewidth=1.4, linestyle=":", label="speed of operation")
     ax.set_xlim(0.0, float(speed.max()))
     ax.set_ylim(0.0, top)
-    label(ax, f"speed of {modes.attrs['reference']} [rpm]", "natural frequency [Hz]")
+    label(ax, f"speed of {modes.attrs['reference']} [rpm]", "natural frequency [Hz]", words)
     legend_below(figure, ax, columns=4)
     return figure
 

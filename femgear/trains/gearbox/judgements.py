@@ -37,6 +37,8 @@ from femgear.trains.gearbox.response_results import OF_BOX_RESPONSE, line_origin
 from femgear.trains.gearbox.silence import why_silent
 from femgear.trains.gearbox.strength import least_safety
 
+_CALM = 1.01
+"""Largest mesh force over its mean below which forces do not vary to speak of."""
 _IDLE = 1e-3
 """Mean force of a mesh over the largest force of all up to which it carries nothing that a ratio would tell about."""
 _RESPONSES = "dynamics", "runup", "balance", "transient"
@@ -72,7 +74,9 @@ def _strength(results: Any) -> Judgement:
     if shown and all(not least.over_life and safety and safety[1][0] == chosen for least, safety in shown):
         missing -= {"dynamic"}  # the response is one of the chosen load case
     with_teeth = [stage.name for stage in (*case.pair, *case.planetary) if stage.teeth]
-    without = NotRated("no stage has teeth", f"give the teeth of {_stages_words(case)} with treatment and hardness")
+    without = NotRated(
+        "the case gives no tooth shapes", f"give the teeth of {_stages_words(case)} with treatment and hardness"
+    )
     if with_teeth:
         of_stages = f"the material of the teeth of {merged_names(with_teeth)}"
         without = NotRated("no teeth have a treatment", f"give treatment and hardness in {of_stages}")
@@ -156,7 +160,10 @@ def _largest_force(results: Any) -> str:
         return ""
     speed, number, _ = np.unravel_index(int(np.nanargmax(factors)), factors.shape)
     where = f"{results[stage]['stage'].values[number]} at {results[stage]['speed'].values[speed]:,.4g} rpm"
-    return f"Its mesh forces reach {np.nanmax(factors):.2f} times their mean ({where})"
+    largest = float(np.nanmax(factors))
+    if largest < _CALM:
+        return f"Its mesh forces stay within {_CALM - 1.0:.0%} of their mean"
+    return f"Its mesh forces reach {largest:.2f} times their mean ({where})"
 
 
 def _unheard(results: Any) -> Judgement:

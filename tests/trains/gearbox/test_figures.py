@@ -104,6 +104,17 @@ def test_the_campbell_diagram_has_modes_by_kind_lines_by_name_and_the_speed_of_o
     assert ax.get_xlabel() == "speed of input [rpm]"
 
 
+def test_a_campbell_diagram_ends_above_the_lines_and_counts_the_modes_beyond(data):
+    modes = data[1].copy(deep=True)
+    hertz = np.sort(modes["frequency"].values[modes["frequency"].values > 0.0])
+    # the highest line reaches the middle between two modes, over 1.3
+    reach = 0.5 * (hertz[len(hertz) // 2 - 1] + hertz[len(hertz) // 2])
+    modes["order"].values[:] *= 60.0 * reach / 1.3 / float(modes["campbell_speed"].max() * modes["order"].max())
+    ax = gearbox_campbell(modes).axes[0]
+    assert ax.get_ylim()[1] == pytest.approx(reach)
+    assert ax.get_title(loc="left") == f"{(hertz > reach).sum()} modes above, which no line comes near"
+
+
 def test_names_of_lines_of_excitation_do_not_lie_on_one_another(data):
     modes = data[1].copy(deep=True)
     # all leave at the right end, half way up
