@@ -21,8 +21,9 @@ def femgear(*words):
     return subprocess.run(command, capture_output=True, text=True, env=ENVIRONMENT, timeout=1200)
 
 
-QUICK = "spur_pair", "published_four_stages", "helical_30_20_70", "own_chain"
-"""Cases whose run takes a few seconds without pictures."""
+QUICK = ("spur_pair", "published_four_stages")
+LONGER = ("helical_30_20_70", "own_chain")
+"""Cases whose run takes few seconds without pictures, and those that take more."""
 SCREEN = 45
 """Lines of 80 columns that a run without --verbose has at most."""
 
@@ -38,7 +39,7 @@ def lines_on_a_terminal(case, out, *options):
     return [line for line in lines if "%" not in line or "0:" not in line]
 
 
-@pytest.mark.parametrize("name", QUICK)
+@pytest.mark.parametrize("name", [*QUICK, *(pytest.param(name, marks=pytest.mark.slow) for name in LONGER)])
 def test_a_run_is_told_on_one_screen(name, tmp_path):
     case = CASES[0].parent / f"{name}.toml"
     lines = lines_on_a_terminal(case, tmp_path / "run", "--no-pictures")

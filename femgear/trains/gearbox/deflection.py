@@ -14,6 +14,7 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
+from scipy.sparse import csr_array
 
 from femgear.errors import FemgearError, several
 from femgear.system.assembly import GROUND, Assembly, StationSprings
@@ -396,6 +397,9 @@ def solve_state(model: GearboxModel, gap: np.ndarray, *, start: Deflection | Non
     if start is None and (laws or gap.any()):
         y = _guess(T, K, W, k, gap, laws, model.load, assembly)
 
+    # most motions are single coordinates: a sparse product takes their rows and columns alone
+    chosen = csr_array(T)
+
     def forces(y):
         q = T @ y
         press = np.maximum(W.T @ q - gap, 0.0)
@@ -405,7 +409,7 @@ def solve_state(model: GearboxModel, gap: np.ndarray, *, start: Deflection | Non
             force, stiffness = law.force(rows @ q)
             inner = inner + rows.T @ force
             tangent = tangent + rows.T @ stiffness @ rows
-        return T.T @ (model.load - inner), T.T @ tangent @ T
+        return T.T @ (model.load - inner), np.ascontiguousarray(chosen.T @ tangent @ chosen)
 
     y, residual, iterations, left = _newton(forces, y, scale)
     if left is not None:
