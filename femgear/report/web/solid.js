@@ -147,7 +147,7 @@ page.solid = () => {
       const ends = model.root_stress || all[Math.floor(0.9997 * all.length)], largest = (choice ? top : ends) || 1;
       bodies.forEach((body, i) => paint(body, values[i], largest));
       const plane = Object.values(model.sectors).some((sector) => sector.twist) ? ", of the transverse section, turned along the helix" : "";
-      const end = choice ? largest.toPrecision(3) : model.root_stress ? `${largest.toFixed(0)}, the largest root stress of the mesh period` : `above ${largest.toPrecision(3)}`;
+      const end = choice ? largest.toPrecision(3) : model.root_stress ? `${largest.toFixed(0)}, the largest root stress` : `above ${largest.toPrecision(3)}`;
       legend(choice ? "displacement [µm]" : "von Mises stress [MPa]", `${end}${plane}`);
       state.factor = (0.03 * radius) / Math.max(...state.fields.map((field) => sizes(field).reduce((a, b) => Math.max(a, b), 1e-12)));
     } else {
