@@ -66,7 +66,7 @@ def test_run_up_at_full_band(benchmark, reference, count, limit):
     benchmark.group = RUNS
     assert reference.modes is not None
     found = benchmark.pedantic(runup_on_bolts, args=(reference, count), rounds=1)
-    note = f"{len(found.input_speed)} speeds with those beside resonances, {found.heard.lines.shape[1]} lines"
+    note = f"{len(found.input_speed)} speeds with those beside resonances, {found.response.lines.shape[1]} lines"
     promise(benchmark, f"run-up of {count} speeds, 300 to 3100 rpm, six bolts", note, limit)
 
 

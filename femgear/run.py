@@ -275,7 +275,7 @@ def _asked(case: ReadCase, only: str | None) -> tuple[Any, tuple[Stage, ...]]:
     """The case as it is computed up to its last stage, and the stages; refuses what they cannot represent."""
     check_case(case, only)
     stages = stages_of(case, only)
-    return (case if only is None else stages[-1].asked(case)), tuple(stages)
+    return (case if only is None else stages[-1].case_if_requested(case)), tuple(stages)
 
 
 def _options(stage: Stage, progress: Progress, steps: Steps) -> dict[str, Any]:
@@ -342,7 +342,7 @@ class _Run:
         """Write the manifest with some more files."""
         others = {name: digest for name, digest in self.files.items() if name not in names}
         findings = once(finding for stage in self.findings.values() for finding in stage)
-        entries = {"timings": self.timings, "convergence": self.convergence, "known": others}
+        entries = {"timings": self.timings, "convergence": self.convergence, "checksums": others}
         entries["findings"] = findings
         manifest = record(self.folder, list({**self.files, **dict.fromkeys(names)}), **entries, complete=complete)
         self.files = dict(manifest.files)

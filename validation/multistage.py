@@ -46,7 +46,7 @@ NO_LOSS = 1e-9
 
 def modes_of(case) -> GearboxModes:
     """Modes of a gearbox case."""
-    return solve(case, only="modes")["modes"].found
+    return solve(case, only="modes")["modes"].gearbox_modes
 
 
 def ratios() -> tuple[Row, ...]:

@@ -12,7 +12,7 @@ from cyclopts import Parameter
 
 from femgear.commands.files import write_case_file
 from femgear.commands.program import Quantity, Whole, app, examples, whole_number
-from femgear.commands.terminal import Progress, print_blocks, print_findings, say
+from femgear.commands.terminal import Progress, print_blocks, print_warnings, say, warning_lines
 from femgear.study.teeth_request import TeethStrength, WantedTeeth
 
 
@@ -155,7 +155,7 @@ def gearbox(
     written = gearbox_of_case(read_case(case))
     text = case_text.write(written.tables)
     parse_case(text)  # what is no gearbox is refused before a file is written
-    print_findings(written.findings)
+    print_warnings(warning_lines(written.findings, whole=True))
     output = output or Path(f"{case.stem}_gearbox.toml")
     write_case_file(text, output, force=force)
     say(f"next:    femgear run {shlex.quote(str(output))}")
@@ -200,7 +200,7 @@ def casing(
     output = output or case.with_name(f"{case.stem}_in_casing.toml")
     text = f"{text.rstrip()}\n\n{tables}"
     parse_case(text, name=str(output))  # what is no case is refused before a file is written
-    print_findings((*findings, *estimates))
+    print_warnings(warning_lines((*findings, *estimates), whole=True))
     write_case_file(text, output, force=force)
     say(f"next:    femgear run {shlex.quote(str(output))}")
     return 0

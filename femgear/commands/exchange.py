@@ -14,7 +14,7 @@ from cyclopts import Parameter
 import femgear
 from femgear.commands.files import need_new_files, write_case_file
 from femgear.commands.program import Whole, app, examples
-from femgear.commands.terminal import Progress, print_findings, say
+from femgear.commands.terminal import Progress, print_warnings, say, warning_lines
 from femgear.errors import CaseError, FemgearError, printable
 from femgear.exchange.sampling import Sampling
 
@@ -55,7 +55,7 @@ def import_rexs(
 
     model = read_model(file)
     drafts = case_drafts(model, output.name, stage=stage, load_case=load_case)
-    print_findings(model.findings)
+    print_warnings(warning_lines(model.findings, whole=True))
     paths = [output.with_name(f"{output.stem}{case_draft.suffix}{output.suffix}") for case_draft in drafts]
     need_new_files(paths, force=force)
     for draft, path in zip(drafts, paths, strict=True):
@@ -99,7 +99,7 @@ def rexs(
         raise CaseError(message, code="E-OUTPUT", file=str(output), limit=limit)
     model = rexs_model(read_case(case), output.name)
     text = model_text(model, "femgear", femgear.__version__)
-    print_findings(model.findings)
+    print_warnings(warning_lines(model.findings, whole=True))
     write_case_file(text, output, force=force)
     return 0
 

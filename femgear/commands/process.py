@@ -17,7 +17,7 @@ from typing import Any
 from cyclopts import App, CycloptsError, MissingArgumentError
 
 from femgear.commands import INTERRUPTED, LOADING
-from femgear.commands.terminal import print_findings
+from femgear.commands.terminal import print_warnings, warning_lines
 from femgear.errors import CaseError, FemgearError, printable
 from femgear.findings import FindingWarning
 from femgear.storage.disk_errors import noted_interrupts, storage_error
@@ -148,7 +148,8 @@ def _show_warning(message, category, filename, lineno, file=None, line=None) -> 
     Those of other libraries say where they come from.
     """
     ours = issubclass(category, FindingWarning) or category is UserWarning
-    print_findings([message if ours else f"{message} ({category.__name__}, {filename}:{lineno})"])
+    warned = message if ours else f"{message} ({category.__name__}, {filename}:{lineno})"
+    print_warnings(warning_lines([warned], whole=True))
 
 
 @contextlib.contextmanager

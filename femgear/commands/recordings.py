@@ -55,7 +55,7 @@ def measured(
 
     data = read_case(case)
     gear_set = heard_in(data, stage)
-    if causes and train_of(data).heard is not None:
+    if causes and train_of(data).recorded_stages is not None:
         message, remedy = "causes are those of a set of its own", "femgear measured of the case of its teeth"
         raise CaseError(message, code="E-ARGUMENTS", key="--causes", remedy=remedy)
     wanted = recording or Recording(), search or LineSearch()

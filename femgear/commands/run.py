@@ -19,6 +19,7 @@ from femgear.commands.terminal import (
     print_briefly,
     print_data,
     print_warnings,
+    room_of_warnings,
     say,
     warning_lines,
 )
@@ -158,7 +159,8 @@ def run(
     check_case(data, only)  # refuse before the folder is touched
     output = output or results_folder(case)
     train = train_of(data)
-    warned = print_warnings(warning_lines(train.case_warnings(data), whole=verbose))
+    of_case = warning_lines(train.case_warnings(data), whole=verbose)
+    print_warnings(of_case)
     place = run_folder(output, case=data.source, force=force)
     with resumable(output, completed_since_now(output)):
         with place as folder, Progress() as progress:
@@ -171,7 +173,7 @@ def run(
                         if verbose:
                             print_blocks(train.describe_results(results))
                         else:
-                            print_briefly(train.describe_briefly(results, only), warned + len(lines))
+                            print_briefly(train.describe_briefly(results, only), room_of_warnings((*of_case, *lines)))
                         sys.stdout.flush()
                     print_warnings(lines)
                 if pictures:

@@ -8,13 +8,13 @@ import sys
 import textwrap
 import threading
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from typing import TYPE_CHECKING
 
 from femgear.errors import printable
 
 if TYPE_CHECKING:
-    from femgear.findings import Finding
+    pass
 
 SILENCE = 10.0
 """Longest time without a line where standard error is a file or a pipe [s]."""
@@ -196,23 +196,26 @@ def print_data(data: object) -> None:
     print(json.dumps(data, indent=2, ensure_ascii=False, allow_nan=False))
 
 
-def warning_lines(findings: Sequence[Finding], *, whole: bool = False) -> tuple[str, ...]:
-    """Write the findings of a run as warnings: all in full, on a terminal the most severe ones in few lines.
+def warning_lines(findings: Iterable, *, whole: bool = False) -> tuple[str, ...]:
+    """Write findings as warnings: all in full, on a terminal the most severe ones in few lines.
 
     Parameters
     ----------
-    findings : sequence of Finding
+    findings : findings, or texts of what other libraries warn of
     whole : bool
         Whether they are wanted in full on a terminal too.
     """
+    findings = tuple(findings)
+    texts = tuple(f"warning: {printable(str(finding))}" for finding in findings)
+    if whole:
+        return texts
     from rich.console import Console
 
     from femgear.findings import by_severity
 
     console = Console(stderr=True)
-    texts = [f"warning: {printable(str(finding))}" for finding in findings]
-    if whole or not console.is_terminal:
-        return tuple(texts)
+    if not console.is_terminal:
+        return texts
     shown, others = by_severity(findings)[:_MOST_WARNINGS], by_severity(findings)[_MOST_WARNINGS:]
     lines = list[str]()
     for finding in shown:
@@ -225,16 +228,14 @@ def warning_lines(findings: Sequence[Finding], *, whole: bool = False) -> tuple[
     return tuple(lines)
 
 
-def print_warnings(lines: Sequence[str]) -> int:
-    """Print lines of warnings on standard error; returns how many of them a terminal has."""
-    from rich.console import Console
-
+def print_warnings(lines: Iterable[str]) -> None:
+    """Print lines of warnings on standard error."""
     for line in lines:
         print(line, file=sys.stderr)
+
+
+def room_of_warnings(lines: Sequence[str]) -> int:
+    """Count the lines that warnings take of a terminal: none where standard error is none."""
+    from rich.console import Console
+
     return len(lines) if Console(stderr=True).is_terminal else 0
-
-
-def print_findings(findings) -> None:
-    """Print findings on standard error, a line each."""
-    for finding in findings:
-        print(f"warning: {printable(str(finding))}", file=sys.stderr)

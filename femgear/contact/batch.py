@@ -239,7 +239,7 @@ class ContactTangents:
         # products of unit loads on the last cells, and of the columns of L beside them, within the window
         self.unit_2, self.reach_2 = np.split((right * columns).sum(axis=2)[..., 3:], 2, axis=-1)
         self.beside = at(candidates.polynomials, beside[..., None]).swapaxes(-1, -2)
-        self.own = at(np.diagonal(candidates.local, axis1=2, axis2=3), beside)
+        self.local_2 = at(np.diagonal(candidates.local, axis1=2, axis2=3), beside)
 
     def of_meshes(self, smooth: np.ndarray) -> np.ndarray:
         """Tangent stiffness of every mesh (P, meshes) at constant loads of the other meshes [N/m].
@@ -270,7 +270,7 @@ class ContactTangents:
             return (first_factor * other).sum(axis=-2)
 
         Q, unit, reach, beside = (of_mesh(a) for a in (self.Q, self.unit, self.reach, self.beside))
-        ends = (a.reshape(P, meshes, -1) for a in (self.unit_2, self.reach_2, self.own, self.load, self.gap))
+        ends = (a.reshape(P, meshes, -1) for a in (self.unit_2, self.reach_2, self.local_2, self.load, self.gap))
         unit_2, reach_2, square_2, load, gap = ends
         M = S @ np.linalg.inv(np.eye(n) + Q @ S)
         total, through = Q.sum(axis=-1, keepdims=True), S @ beside
@@ -317,7 +317,7 @@ class _ActiveSets:
         start: np.ndarray | None = None,
     ):
         P, W, C = candidates.gap.shape
-        self.found, self.bearings, self.given = candidates, springs, load
+        self.candidates, self.bearings, self.total_load = candidates, springs, load
         # problems at one position, which differ in their separations alone
         self.alike = P > 1 and candidates.local.strides[0] == 0 and candidates.friction is None
         G, arms = candidates.approach[candidates.mesh], np.zeros((0, len(load)))
@@ -346,14 +346,14 @@ class _ActiveSets:
 
         Within Hertz's half width ``b`` the separation grows by less than ``b^2 / 2 R = 2 F / (pi E*)``.
         """
-        candidates, meshes = self.found, self.found.setup.meshes
+        candidates, meshes = self.candidates, self.candidates.setup.meshes
         pushed = -self.arms @ (candidates.approach[:meshes] / self.arm).sum(axis=0)
         springs = np.tile(pushed > 0.8 * pushed.max(initial=0.0), (len(candidates.gap), 1))
         if start is not None:
             return start & candidates.candidate, springs
         kind = candidates.setup.kind(np.arange(len(candidates.approach)))[:, None]
         width, modulus = np.array(candidates.bodies.widths)[kind], candidates.bodies.contact_moduli[kind]
-        share = self.given.sum() / candidates.setup.n_planets
+        share = self.total_load.sum() / candidates.setup.n_planets
         gap = np.where(candidates.candidate, candidates.gap, np.inf)
         smallest = gap.min(axis=-1).reshape(len(gap), len(candidates.approach), -1)
         reached = smallest < smallest.min(axis=-1, keepdims=True) + share / (ROUGH_STIFFNESS * width)
@@ -396,7 +396,7 @@ class _ActiveSets:
 
     def _pivot(self, todo, steps: int, solved) -> None:
         """Change the sides of all violating cells and springs of some positions; mark the `solved` ones."""
-        candidates, changed = self.found, np.ones((len(todo), self.active.shape[1]), bool)
+        candidates, changed = self.candidates, np.ones((len(todo), self.active.shape[1]), bool)
         for _ in range(steps if len(todo) else 0):
             rows, window = np.nonzero(changed)
             place = todo[rows], window
@@ -425,7 +425,7 @@ class _ActiveSets:
         """
         S, columns = self._rows(self.S, todo), self.columns[todo]
         T, n = len(todo), 3 * S.shape[1]
-        onto = self._rows(self.found.polynomials, todo).swapaxes(-1, -2)
+        onto = self._rows(self.candidates.polynomials, todo).swapaxes(-1, -2)
         G = np.repeat(self.G, 3, axis=0)
         Q, moments = onto @ columns, onto @ offset[..., None]
         right = np.concatenate([Q.sum(axis=-1)[..., None] * self.G[:, None], moments], axis=-1)
@@ -473,7 +473,7 @@ class _ActiveSets:
 
     def _yielding(self, todo: np.ndarray, loads: np.ndarray) -> np.ndarray:
         """What the bodies yield in all cells under loads (t, W, C) of some problems [m]."""
-        candidates, values = self.found, self._rows(self.found.polynomials, todo)
+        candidates, values = self.candidates, self._rows(self.candidates.polynomials, todo)
         T, n = len(todo), 3 * loads.shape[1]
         if self.alike:
             by_window, values = loads.swapaxes(0, 1), values[0]
@@ -490,7 +490,7 @@ class _ActiveSets:
 
     def _conditions(self, todo, loads, motions, null):
         """Keep a linear solution; find the cells and springs that violate the other conditions."""
-        candidates, active, springs = self.found, self.active[todo], self.springs[todo]
+        candidates, active, springs = self.candidates, self.active[todo], self.springs[todo]
         candidate, gap = candidates.candidate[todo], candidates.gap[todo]
         elastic = np.where(candidate, self._yielding(todo, loads), 0.0)
         separation = np.where(candidate, gap + elastic, np.inf)
@@ -528,7 +528,7 @@ class _ActiveSets:
             (np.zeros(separation.shape, bool), np.zeros((len(todo), len(self.arms)), bool)) for _ in range(2)
         )
         for at, free in null.items():
-            candidate = self.found.candidate[todo[at]]
+            candidate = self.candidates.candidate[todo[at]]
             arms, gaps = self.G[np.nonzero(candidate)[0]], separation[at][candidate]
             active = self.active[todo[at]][candidate]
             if len(self.arms):
@@ -552,7 +552,7 @@ class _ActiveSets:
         rows = np.nonzero(active.any(axis=-1))
         at, offset = (done[rows[0]], rows[1]), np.zeros(active.shape)
         gaps = self.gaps[at][..., None]
-        offset[rows] = local_solution(self.found.local, at, active[rows], gaps)[..., 0]
+        offset[rows] = local_solution(self.candidates.local, at, active[rows], gaps)[..., 0]
         loads, motions, null = self._linear(done, offset, self.imbalance[done], 0.0)
         conditions = self._conditions(done, self.loads[done] + loads, self.motions[done] + motions, null)
         loads = self.loads[done]
@@ -567,14 +567,14 @@ class _ActiveSets:
 
     def _alone(self, at) -> None:
         """Solve one position by itself, from what touches at the position before."""
-        problem, candidate = self.found.problem(at), self.found.candidate[at]
+        problem, candidate = self.candidates.problem(at), self.candidates.candidate[at]
         before = max(at - 1, 0)
         arrays = problem.compliance, problem.gap, problem.G
         if self.bearings is not None:
             arrays = self.bearings.joined(*arrays)
         start = np.concatenate([self.active[before][candidate], self.springs[before]])
-        state = solve_contact(*arrays, self.given, start=start)
-        if self.found.friction is not None:
+        state = solve_contact(*arrays, self.total_load, start=start)
+        if self.candidates.friction is not None:
             state = self._alone_with_friction(at, arrays, state)
         self.springs[at] = state.active[len(problem.gap) :]
         for name in ("loads", "gaps", "active"):
@@ -590,17 +590,17 @@ class _ActiveSets:
         The map contracts by about the coefficient of friction times roll length over base radius.
         """
         H, gap, G = arrays
-        window, friction = np.nonzero(self.found.candidate[at])[0], self.found.friction
+        window, friction = np.nonzero(self.candidates.candidate[at])[0], self.candidates.friction
         assert friction is not None
         for _ in range(_ROUNDS):
-            before = np.bincount(window, state.loads[: len(window)], minlength=len(self.found.mesh))
+            before = np.bincount(window, state.loads[: len(window)], minlength=len(self.candidates.mesh))
             parted = np.append((friction.supports[at] @ before)[window], np.zeros(len(gap) - len(window)))
-            state = solve_contact(H, gap + parted, G, self.given - before @ friction.arms[at], start=state.active)
+            state = solve_contact(H, gap + parted, G, self.total_load - before @ friction.arms[at], start=state.active)
             after = np.bincount(window, state.loads[: len(window)], minlength=len(before))
             if np.abs(after - before).max() <= _SETTLED * np.abs(after).max():
                 return state
         raise ContactError(
-            f"the contact with friction does not settle at position {self.found.position[at]}",
+            f"the contact with friction does not settle at position {self.candidates.position[at]}",
             code="E-CONTACT",
             key="losses.excites",
             limit=f"{_ROUNDS} solutions",

@@ -233,18 +233,18 @@ def make_sectors(
     flank_elements: int = 24,
     refine: float = 1.0,
     cache: Path | None = None,
-    known: Sequence[Sector | None] = (),
+    sectors_kept: Sequence[Sector | None] = (),
 ) -> Sectors:
     """Mesh one sector of each gear and assemble its stiffness matrix.
 
     ``material`` is that of all gears or one for each, ``flank_elements`` are the element edges along a flank,
     ``refine`` divides all element sizes, ``cache`` is the folder of generated grids. Teeth are as wide as the
     face that they have in common with their mates (ISO 6336-1 has the stiffness of a pair for that width), of
-    two mates the wider one; bodies below them have their own width. Sectors that are ``known`` are taken,
-    None stands for the others.
+    two mates the wider one; bodies below them have their own width. Those in ``sectors_kept`` are
+    taken as they are, None stands for a sector to make.
     """
-    gears, known = planetary_set.gears, known or [None] * len(planetary_set.gears)
-    new = [gear for gear, sector in zip(gears, known, strict=True) if sector is None]
+    gears, sectors_kept = planetary_set.gears, sectors_kept or [None] * len(planetary_set.gears)
+    new = [gear for gear, sector in zip(gears, sectors_kept, strict=True) if sector is None]
     halves = [half_sector(gear, flank_elements=flank_elements, refine=refine) for gear in new]
     try:
         grids = mesh_outlines(halves, cache=cache)
@@ -257,7 +257,7 @@ def make_sectors(
         raise
     sectors, materials, grids = [], material_of_each(material, len(gears)), iter(grids)
     widths = flank_widths([gear.face_width for gear in gears])
-    for gear, sector_given, material_of_gear, teeth in zip(gears, known, materials, widths, strict=True):
+    for gear, sector_given, material_of_gear, teeth in zip(gears, sectors_kept, materials, widths, strict=True):
         if sector_given is not None:
             sectors.append(sector_given)
             continue
@@ -287,7 +287,7 @@ def make_bodies(
     *,
     depth: float | None = None,
     ring_foundation=None,
-    known: Sequence[FlankCompliance | None] = (),
+    compliances_kept: Sequence[FlankCompliance | None] = (),
 ) -> Bodies:
     """Compute the flank compliances, sun and planets held at their bores and the ring at its outer surface.
 
@@ -299,15 +299,15 @@ def make_bodies(
         Largest depth at which body and half plane are joined [m].
     ring_foundation : (2n, 2n) sparse matrix, optional
         Stiffness of an elastic foundation of the ring, which then is not held [N/m].
-    known : sequence, optional
-        Compliances of gears that are there already; None stands for the others.
+    compliances_kept : sequence, optional
+        Flank compliances of the gears that are there already; None stands for one to compute.
     """
-    known = known or [None] * len(sectors.gears)
+    compliances_kept = compliances_kept or [None] * len(sectors.gears)
     # roots of sectors of two plane states or widths need a solution of their own, see `root_stress`
     face_widths = [s.gear.face_width for s in sectors.gears]
     widths = flank_widths(face_widths)
-    compliances, materials = list(known), material_of_each(material, len(sectors.gears))
-    missing = [number for number, before in enumerate(known) if before is None]
+    compliances, materials = list(compliances_kept), material_of_each(material, len(sectors.gears))
+    missing = [number for number, before in enumerate(compliances_kept) if before is None]
     tasks = [
         partial(
             _of_sector,

@@ -119,7 +119,7 @@ def contact_over_width(
         closer = closer[:, np.arange(rows), :, np.arange(rows) % S].swapaxes(0, 1)[..., None]
     values["pair_approach"] = np.repeat(base, rows // P, axis=1)[..., None] + closer.max(axis=-1)
     values["pair_force"] = sliced.force.reshape(rows, -1, W).mean(axis=1)
-    for name, tangent in zip(("stiffness", "held_stiffness"), sliced.own, strict=False):
+    for name, tangent in zip(("stiffness", "held_stiffness"), sliced.tangents, strict=False):
         # tangents of the springs change; what they begin at is that of the cells
         values[name] = plane.get(name, 0.0) + tangent.T
     if over.held is not None:

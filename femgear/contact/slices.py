@@ -50,7 +50,7 @@ class SliceState:
         Mesh of every window.
     iterations, residual : (P,) arrays
         Linear solutions, and largest violation of the contact conditions over the largest displacement.
-    own : tuple of (P, meshes) arrays
+    tangents : tuple of (P, meshes) arrays
         For the bodies, and others that were asked for: increments of the mesh forces per unit approach of
         every mesh at constant loads of the others [N/m]. Of spur teeth less those of the plane solution.
     joint : (H, P, meshes, meshes) array
@@ -63,7 +63,7 @@ class SliceState:
     mesh: np.ndarray
     iterations: np.ndarray
     residual: np.ndarray
-    own: tuple[np.ndarray, ...]
+    tangents: tuple[np.ndarray, ...]
     joint: np.ndarray
 
     def largest(self) -> np.ndarray:

@@ -59,21 +59,21 @@ class BearingReader:
         What the file holds.
     remarks : dict of str
         What is assumed, by key of the case.
-    told : dict of list
-        Ids of bearings by what is to be told of them.
+    bearings_by_remark : dict of list
+        Ids of bearings by the text, the remedy and the severity of a remark on them.
     """
 
     model: Model
     remarks: dict[str, str]
-    told: dict[tuple[str, str, str], list[str]] = field(default_factory=dict)
+    bearings_by_remark: dict[tuple[str, str, str], list[str]] = field(default_factory=dict)
 
     def tell(self, part: Component, what: str, remedy: str = "", severity: str = DOUBT) -> None:
         """Keep what is to be told of a bearing; one finding tells it of all."""
-        self.told.setdefault((what, remedy, severity), []).append(part.id)
+        self.bearings_by_remark.setdefault((what, remedy, severity), []).append(part.id)
 
     def finish(self) -> None:
         """Make the findings of all bearings."""
-        for (what, remedy, severity), ids in self.told.items():
+        for (what, remedy, severity), ids in self.bearings_by_remark.items():
             several = len(ids) > 1
             name = f"bearing{'s' * several} {', '.join(ids)}"
             self.model.remark("bearing", f"{name}: {what}", remedy=remedy, severity=severity)

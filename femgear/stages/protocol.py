@@ -256,7 +256,7 @@ class Stage:
         ``(case) -> str``: why the case cannot have the stage, empty where it can.
     needs : callable, optional
         ``(case) -> tuple of str``: stages that must come before, where they are not those of `takes`.
-    asked : callable
+    case_if_requested : callable
         ``(case) -> case``: the case as it is computed where the stage is the last one by name.
     check : callable, optional
         ``(case)``: refuses, before a run, what the stage cannot represent.
@@ -283,7 +283,7 @@ class Stage:
     wanted: Callable[[Any], bool] = lambda case: True
     unavailable: Callable[[Any], str] = lambda case: ""
     needs: Callable[[Any], tuple[str, ...]] | None = None
-    asked: Callable[[Any], Any] = lambda case: case
+    case_if_requested: Callable[[Any], Any] = lambda case: case
     check: Callable[[Any], object] | None = None
     tables: Callable[[Results], Iterable[Block]] = lambda results: ()
     warnings: Callable[[xr.Dataset], Iterable[Finding]] = lambda data: ()
@@ -385,7 +385,7 @@ class Train:
         Stage that has the mesh stiffness over the position, and its variables of stiffness and transmission error.
     front : tuple of (str, int)
         Charts of page one, the first two of which are there: name of the figure, and number of its panel.
-    heard : callable, optional
+    recorded_stages : callable, optional
         ``(case) -> stages``: planetary stages that recordings tell, by name; None of trains that are no gearbox.
     stands_in : mapping of str to str
         Stages of other trains, with the stage of this one that has their results.
@@ -414,7 +414,7 @@ class Train:
     dynamic_model: Callable[[Any, Mapping[str, Any]], DynamicModel] | None = None
     stiffness_curves: tuple[str, str, str] = ("static", "mesh_stiffness", "ste")
     front: tuple[tuple[str, int], ...] = ()
-    heard: Callable[[Any], Mapping[str, HeardSet]] | None = None
+    recorded_stages: Callable[[Any], Mapping[str, HeardSet]] | None = None
     stands_in: Mapping[str, str] = field(default_factory=dict)
     duty: Callable[[Any], str] = lambda case: ""
     check_model: Callable[[Any], None] = lambda case: None

@@ -268,7 +268,7 @@ def flank_compliances(
         materials,
         flank_elements=case.static.flank_elements,
         cache=cache,
-        known=[steps.kept(f"sector of the {name}", entry) for name, entry in zip(names, entries)],
+        sectors_kept=[steps.kept(f"sector of the {name}", entry) for name, entry in zip(names, entries)],
     )
     for name, entry, sector in zip(names, entries, sectors.gears, strict=True):
         steps.keep(f"sector of the {name}", entry, sector)
@@ -281,7 +281,7 @@ def flank_compliances(
         materials,
         depth=case.static.depth,
         ring_foundation=foundation,
-        known=[steps.kept(f"flanks of the {name}", entry) for name, entry in zip(names, entries)],
+        compliances_kept=[steps.kept(f"flanks of the {name}", entry) for name, entry in zip(names, entries)],
     )
     for name, entry, body in zip(names, entries, bodies.gears):
         steps.keep(f"flanks of the {name}", entry, body)
@@ -531,7 +531,7 @@ def _waves_of_case(case: Any, gears: GearSet, steps: Steps, cache: Path | None) 
         flank_elements=6,
         refine=0.5,
         cache=cache,
-        known=[waves_kept and waves_kept.sector for waves_kept in sectors_kept],
+        sectors_kept=[waves_kept and waves_kept.sector for waves_kept in sectors_kept],
     )
     missing = [number for number, before in enumerate(sectors_kept) if before is None]
     tasks = [
@@ -824,5 +824,7 @@ STRESS = Stage(
     unavailable=lambda case: (
         "" if case.helix_angle is None or case.static.slices > 1 else "helical teeth need static.slices = 25"
     ),
-    asked=lambda case: case.model_copy(update={"static": case.static.model_copy(update={"stresses": True})}),
+    case_if_requested=lambda case: case.model_copy(
+        update={"static": case.static.model_copy(update={"stresses": True})}
+    ),
 )

@@ -512,7 +512,7 @@ def record(
     timings: Mapping[str, float],
     convergence: Mapping[str, object],
     findings: Iterable[Finding] = (),
-    known: Mapping[str, str] = MappingProxyType({}),
+    checksums: Mapping[str, str] = MappingProxyType({}),
     complete: bool = False,
 ) -> Manifest:
     """Write the manifest of what a run has written so far; see `Manifest`.
@@ -521,12 +521,12 @@ def record(
     ----------
     names : list of str
         Files that the run wrote, as paths inside the folder.
-    known : mapping of str to str
-        Checksums of those that are as they were, which saves reading them.
+    checksums : mapping of str to str
+        Those of the files that are as they were, which saves reading them.
     convergence : mapping
         Numbers, texts, arrays and tables of these; numbers that are not finite are stored as null.
     """
-    files = {name: known.get(name) or checksum(Path(folder) / name) for name in names}
+    files = {name: checksums.get(name) or checksum(Path(folder) / name) for name in names}
     manifest = Manifest(complete, files, timings, convergence, versions(), tuple(findings))
     _write_manifest(folder, manifest)
     return manifest

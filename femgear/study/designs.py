@@ -503,29 +503,29 @@ class Evaluations:
         self.best = np.full(len(problem.variables), np.nan), np.inf
         self.course: list[float] = []
         # a dict keeps their order
-        self._asked: dict[tuple, None] = {}
+        self._requested: dict[tuple, None] = {}
         self._most = max_designs
 
     def towards(self, objective: StudyQuantity) -> Evaluations:
         """Give the same designs, counted together, another objective."""
         alike = Evaluations(replace(self.problem, objective=objective), self.designs, max_designs=self._most)
-        alike._asked = self._asked
+        alike._requested = self._requested
         return alike
 
     @property
-    def asked(self) -> int:
+    def requested(self) -> int:
         """Different points that were asked for, whether the journal held them or not."""
-        return len(self._asked)
+        return len(self._requested)
 
     @property
-    def asked_points(self) -> list[tuple]:
+    def requested_points(self) -> list[tuple]:
         """These points but for the case as it is, in their order."""
-        return [point for point in self._asked if point]
+        return [point for point in self._requested if point]
 
     def values(self, x: Vector | None, quantities: Sequence[StudyQuantity]) -> dict[str, float]:
         """Compute quantities [SI] at a point x (n,), or of the case as it is; see `Designs`."""
         point = () if x is None else self.problem.point(x)
-        self._asked[point] = None
+        self._requested[point] = None
         return self.designs.values(point, quantities)
 
     def cost(self, x: Vector) -> float:
@@ -548,18 +548,18 @@ class Evaluations:
     def ahead(self, places: Iterable[Vector], also: Sequence[StudyQuantity] = ()) -> None:
         """Compute at once what `cost` will ask of many points, and further quantities."""
         points = dict.fromkeys(self.problem.point(x) for x in places)
-        new = [point for point in points if point not in self._asked]
-        room = None if self._most is None else max(self._most - self.asked, 0)
+        new = [point for point in points if point not in self._requested]
+        room = None if self._most is None else max(self._most - self.requested, 0)
         quantities = (self.problem.objective, *also)
         deque(self.designs.ahead(new[:room], quantities, self.problem.limits), 0)
 
     def count(self, x: Vector) -> bool:
         """Note that a point is asked for, and say whether it is new; may raise `Enough`."""
         point = self.problem.point(x)
-        new = point not in self._asked
-        if self._most is not None and new and self.asked >= self._most:
+        new = point not in self._requested
+        if self._most is not None and new and self.requested >= self._most:
             raise Enough
-        self._asked[point] = None
+        self._requested[point] = None
         return new
 
     def penalised(self, x: Vector, value) -> float:

@@ -89,7 +89,7 @@ def relief_contours(amounts, lengths, ratios, torques, *, optimum=None, design=N
             # a contour has no legend entry of its own
             ax.plot([], [], color=COLOURS[4], linewidth=2.0, label=f"{quarter:.0%} of unmodified")
         if optimum is not None:
-            _mark(ax, optimum, own=design is None or np.isclose(torque, design), design=design)
+            _mark(ax, optimum, at_this_torque=design is None or np.isclose(torque, design), design=design)
         label(ax, "length [two-pair contact]", title=f"{torque:g} N m")
     label(axes[0], y="amount at the tips [µm]")
     bar = figure.colorbar(filled, ax=axes)
@@ -98,12 +98,12 @@ def relief_contours(amounts, lengths, ratios, torques, *, optimum=None, design=N
     return figure
 
 
-def _mark(ax, optimum, *, own: bool, design) -> None:
+def _mark(ax, optimum, *, at_this_torque: bool, design) -> None:
     """A full circle under the torque of the optimum, an open one under others."""
     amount, length = optimum
-    name = "optimum" if own else f"chosen for {design:g} N m"
-    name = f"optimum at {design:g} N m" if own and design is not None else name
-    face = VERMILION if own else "white"
+    name = "optimum" if at_this_torque else f"chosen for {design:g} N m"
+    name = f"optimum at {design:g} N m" if at_this_torque and design is not None else name
+    face = VERMILION if at_this_torque else "white"
     style = {"color": VERMILION, "markerfacecolor": face, "markersize": 9, "markeredgewidth": 2.0}
     ax.plot(length, 1e6 * amount, "o", label=name, clip_on=False, **style)
 

@@ -149,8 +149,8 @@ def pareto_front(
         best = non_dominated(values)
         order = best[np.argsort(values[best, 0], kind="stable")]
         rest, designs = np.setdiff1d(np.arange(len(values)), best), run.designs
-        points_asked = map(problem.point, x[order] if options.telling else ())
-        doubts = dict(designs.runner.map(partial(designs.findings, both), points_asked))
+        points_to_tell = map(problem.point, x[order] if options.telling else ())
+        doubts = dict(designs.runner.map(partial(designs.findings, both), points_to_tell))
         for outcome in doubts.values():
             if isinstance(outcome, FemgearError):
                 raise outcome
@@ -162,7 +162,7 @@ def pareto_front(
             before=before,
             dominated=values[rest],
             findings=tuple(doubts.get(i, ()) for i in range(len(order))),
-            designs=run.asked,
+            designs=run.requested,
             failures=len(designs.failures),
             complete=complete,
         )
@@ -240,7 +240,7 @@ def _known(run: Evaluations, quantities) -> tuple[np.ndarray, np.ndarray]:
     """
     problem, points, values = run.problem, [], []
     low, high = problem.bounds.T
-    for point in run.asked_points:
+    for point in run.requested_points:
         values_known = (run.designs.journal.get(json.dumps(point)) or {}).get("values", {})
         if any(q.name not in values_known for q in quantities):
             continue

@@ -386,7 +386,7 @@ class _Level:
         Of contact in slices of the width.
     """
 
-    found: Candidates
+    candidates: Candidates
     springs: PairSprings
     touching: np.ndarray
     shifts: csr_array
@@ -788,7 +788,7 @@ def _solved(
     Springs do not solve those whose iteration does not end, windows those whose contact they do not contain.
     Pairs overlap under so many times the approach of the flanks.
     """
-    candidates, N = level.found, model.solved.gears.n_planets
+    candidates, N = level.candidates, model.solved.gears.n_planets
     (n, P), back, by_error = (len(errors), len(model.position)), np.argsort(model.order), errors.T.copy()
     separations, tilts = _separations(model, level, by_error)
     force, motions, stiffness, ended = solve_laws(level.springs, model.load, separations, tilts)
@@ -820,7 +820,7 @@ def _in_slices(model: SampleModel, level: _Level, errors: np.ndarray) -> SliceSo
     """Solve samples in slices as springs."""
     over, N = level.over, model.solved.gears.n_planets
     assert over is not None
-    by_error, mesh = errors.T.copy(), level.found.mesh
+    by_error, mesh = errors.T.copy(), level.candidates.mesh
     separations, tilts = _separations(model, level, by_error)
     leads = (over.shifts @ by_error).reshape(2 * N, over.springs.slices, -1)
     of_windows = over.apart.swapaxes(1, 2)[..., None] + leads[mesh]
@@ -830,7 +830,7 @@ def _in_slices(model: SampleModel, level: _Level, errors: np.ndarray) -> SliceSo
 def _overflows(level: _Level, force: np.ndarray) -> np.ndarray:
     """Tell (n,) whether slices with such largest forces (P, W, n) press the end of a window amid a flank."""
     reached = level.touching[:, :, [0, -1], None] <= force[:, :, None]
-    amid = ~np.moveaxis(level.found.at_edge, 0, -1)[..., None]
+    amid = ~np.moveaxis(level.candidates.at_edge, 0, -1)[..., None]
     return np.asarray((reached & amid).any(axis=(0, 1, 2)))
 
 
@@ -842,7 +842,7 @@ def _of_slices(
     Not solved are those whose iteration does not end, that windows do not hold, and whose contacts are
     points. Pairs overlap under so many times the approach of the flanks.
     """
-    over, candidates, N = level.over, level.found, model.solved.gears.n_planets
+    over, candidates, N = level.over, level.candidates, model.solved.gears.n_planets
     assert over is not None
     width, slices, shared = candidates.bodies.widths[0], over.springs.slices, len(model.load)
     contact = (level.touching[..., None] <= state.largest[:, :, None]).sum(axis=2)
@@ -926,8 +926,8 @@ def _at_position(level: _Level, at: int, times: int) -> Candidates:
         return np.broadcast_to(values, (times, *values.shape))
 
     names = "position", "pair", "gap", "candidate", "polynomials", "local"
-    arrays = {name: repeated(getattr(level.found, name)[at]) for name in names}
-    return replace(level.found, **arrays, images=np.moveaxis(repeated(level.found.images[:, at]), 0, 1))
+    arrays = {name: repeated(getattr(level.candidates, name)[at]) for name in names}
+    return replace(level.candidates, **arrays, images=np.moveaxis(repeated(level.candidates.images[:, at]), 0, 1))
 
 
 def sample_case(case: Case, model: SampleModel, seed: int, index: int) -> Case:
@@ -996,14 +996,14 @@ def over_a_turn(model: SampleModel, errors: np.ndarray) -> tuple[float, float]:
         cycle = sample.walk(model.sun_torque, periods=model.basis.gears.ring.teeth)
         return float(cycle.peak_to_peak("sun_arc")), float(cycle.extremes("load_share")[1].max())
     s, level, P = model.solved, model.level(*model.windows), len(model.position)
-    setup, periods = level.found.setup, np.arange(s.gears.ring.teeth)
+    setup, periods = level.candidates.setup, np.arange(s.gears.ring.teeth)
     turns = np.repeat(-periods if s.gears is not model.basis.gears else periods, P)
     tau = np.tile(model.position, len(periods)) + turns
     where = setup.tooth, np.tile(setup.turns, len(periods)) + turns, tau
     apart = pair_separations(s.gears, model.image(model.deviations(errors)), *where, back=False)
     case = pair_separations(s.gears, s.deviations, setup.tooth, setup.turns, model.position, back=False)
     apart = np.moveaxis(apart.reshape(len(apart), len(periods), P, -1) - case[:, None], 1, -1)
-    candidates, N = level.found, s.gears.n_planets
+    candidates, N = level.candidates, s.gears.n_planets
     separations = apart[candidates.mesh, candidates.position[:, None], candidates.pair]
     tilts = None
     if level.tilts is not None:

@@ -348,7 +348,7 @@ def _optimum(run: Evaluations, before: dict, sensitivity: bool, telling: bool, e
         all_off=all_off,
         findings=findings,
         course=tuple(run.course),
-        designs=run.asked,
+        designs=run.requested,
         computed=designs.computed,
         failures=len(designs.failures),
         seconds=designs.seconds / max(designs.computed, 1),
@@ -442,7 +442,7 @@ def numbers(problem: Problem, point: Point) -> np.ndarray:
 def infeasible(run: Evaluations, limit: str | None = None) -> ConvergenceError:
     """Make the error that a search ends with that found no design."""
     return ConvergenceError(
-        f"none of {run.asked} designs can be computed and lies within the limits",
+        f"none of {run.requested} designs can be computed and lies within the limits",
         code="E-INFEASIBLE",
         limit=limit,
         remedy="widen limits or bounds, or ask for more samples",

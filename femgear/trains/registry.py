@@ -222,7 +222,7 @@ def heard_in(case: Any, stage: str | None = None) -> HeardSet:
     """
     from femgear.measured.heard_set import heard_set
 
-    stages_of_case = train_of(case).heard
+    stages_of_case = train_of(case).recorded_stages
     if stages_of_case is None:
         if stage is not None:
             message, remedy = "a set of its own has no stages", "leave it out"

@@ -330,7 +330,8 @@ def test_first_cells_and_springs_are_those_that_equal_forces_would_press():
     # equal forces on all drive flanks push along both motions alike, over their arms
     found.approach = np.array([[-4.0, 0.0], [1.0, 0.0], [1.0, -1.0], [0.0, 0.5], *np.full((4, 2), 5.0)])
     arms = np.array([[1.0, 0.0], [0.7, 0.7], [0.9, 0.4], [0.0, 1.0], [-1.0, 0.0]])
-    sets: Any = SimpleNamespace(found=found, given=np.array([0.0, 4000.0]), arms=arms, arm=np.array([4.0, 1.0]))
+    load, arm = np.array([0.0, 4000.0]), np.array([4.0, 1.0])
+    sets: Any = SimpleNamespace(candidates=found, total_load=load, arms=arms, arm=arm)
     active, springs = batch._ActiveSets._first(sets)
     assert springs.tolist() == [[False, True, True, False, False]]
     # where a pair is too far away the other one carries alone; back flanks carry nothing

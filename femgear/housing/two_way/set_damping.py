@@ -75,7 +75,7 @@ class _Sector:
         Numbers of these orders and modes.
     shape : (modes, waves) complex array
         Waves of the ring in each mode.
-    own : (modes, modes) array
+    structure_damping : (modes, modes) array
         Damping between the modes at each order alone [1/s].
     place : (orders, waves) int array
         Place of K + s n of each wave among what classes have of them.
@@ -90,7 +90,7 @@ class _Sector:
     orders: np.ndarray
     modes: np.ndarray
     shape: np.ndarray
-    own: np.ndarray
+    structure_damping: np.ndarray
     place: np.ndarray
     path: np.ndarray
     diameters: np.ndarray
@@ -267,7 +267,7 @@ class SetDamping:
         on_structure, waves = np.zeros_like(structure), list[np.ndarray]()
         for class_, motion in zip(residue.sectors, moved):
             made = rows_times(on_waves[:, class_.place], class_.shape.conj().T)
-            made -= order[:, class_.orders] * rows_times(motion, class_.own)
+            made -= order[:, class_.orders] * rows_times(motion, class_.structure_damping)
             on_structure[:, class_.orders, : len(class_.modes)] = made
             waves.append(rows_times(made * class_.of_modes(structure), class_.path))
         path = _joined(waves)
@@ -391,14 +391,15 @@ class _Waves:
     """Waves of the ring on its path, and the damping between them, the gears and the modes of the structure.
 
     ``orders`` and ``structure`` as in `SetDamping`, ``near`` numbers those of its waves that the path has. ``whole`` is
-    the damping matrix of the modes of the gears and these waves, ``own`` (m, m) that of the modes of the structure.
+    the damping matrix of the modes of the gears and these waves, ``structure_damping`` (m, m) that of the modes of the
+    structure.
     """
 
     orders: CarrierOrders
     structure: FixedStructure
     near: np.ndarray
     whole: np.ndarray
-    own: np.ndarray
+    structure_damping: np.ndarray
 
     @cached_property
     def number(self) -> np.ndarray:
@@ -475,7 +476,7 @@ def _residue(waves: _Waves, leading: LeadingMeshes, residue: int) -> _Residue:
                 rows,
                 moved,
                 shape,
-                waves.own[np.ix_(moved, moved)],
+                waves.structure_damping[np.ix_(moved, moved)],
                 at_bands[back[np.ix_(rows, place[waves_there])], waves_there],
                 structure.ring_shape[np.ix_(moved, on_path)],
                 on_path,

@@ -46,7 +46,7 @@ class ModalForces:
         Of each natural frequency [1].
     force : (G, H) array
         Modal force [N/kg^1/2], of several modes of one frequency the root of the sum of squares.
-    heard : (G, H) array
+    output_level : (G, H) array
         Root mean square [m/s^2] of the output of these modes, were they free masses: what is heard far above
         them, ``1/(2 damping_ratio)`` times as much in resonance.
     """
@@ -55,7 +55,7 @@ class ModalForces:
     frequency: np.ndarray
     damping_ratio: np.ndarray
     force: np.ndarray
-    heard: np.ndarray
+    output_level: np.ndarray
 
     def __post_init__(self):
         freeze(self)
@@ -123,7 +123,7 @@ def modal_forces(modes: Modes, excitation: MeshExcitation, count: int, output=No
         damping_ratio=damping[first],
         force=np.sqrt(np.add.reduceat(np.abs(Q) ** 2, first, axis=0)),
         # mass-normalised modes: their force is an acceleration
-        heard=np.sqrt(0.5 * (np.abs(amplitude) ** 2).sum(axis=-1)),
+        output_level=np.sqrt(0.5 * (np.abs(amplitude) ** 2).sum(axis=-1)),
     )
 
 
@@ -154,7 +154,7 @@ def refined_speeds(speeds: np.ndarray, resonance: np.ndarray, level_times_dampin
     resonance, damping : (c,) arrays
         Speed and damping ratio of every resonance.
     level_times_damping : (c,) array
-        Its level times its damping ratio, as of `ModalForces.heard`.
+        Its level times its damping ratio, as of `ModalForces.output_level`.
     """
     step = np.diff(speeds).max(initial=0.0) if len(speeds) > 1 else np.inf
     narrow = np.flatnonzero((damping > 0.0) & (damping * resonance < step))

@@ -53,13 +53,13 @@ class Records:
     """What a run keeps of its steps: one record of ``every`` so many.
 
     With ``lowpass`` they are low-passed (`Decimator`), so that nothing beyond half their rate appears as
-    something else; otherwise they are the motion at these instants as it is. ``told`` is called with the
+    something else; otherwise they are the motion at these instants as it is. ``progress`` is called with the
     share of the steps that are done.
     """
 
     every: int = 1
     lowpass: bool = False
-    told: Callable[[float], object] = lambda share: None
+    progress: Callable[[float], object] = lambda share: None
 
 
 @dataclass(frozen=True)
@@ -181,7 +181,7 @@ def march_flanks(
             balances.check(states, block, first, free=motion.free, contact_loss=contact_loss)
             record.take(first, states, block)
             motion.state = balances.without_drift(states[-1])
-            records.told(min(first + _BLOCK, count) / count)
+            records.progress(min(first + _BLOCK, count) / count)
     return MarchedRun(
         **record.columns(step),
         meshes=spun.meshes,

@@ -222,7 +222,7 @@ class RunupResult(StageResult):
     level_change: np.ndarray
     compared_to: float
     carrier_speed: np.ndarray
-    heard: HeardSpeeds
+    response: HeardSpeeds
     resonances: Mapping[str, Any]
     ring_teeth: int
     sensor_angle: float
@@ -242,7 +242,7 @@ class RunupResult(StageResult):
 
     def contents(self) -> Contents:
         """Collect the contents of runup.nc."""
-        computed, kinds = self.heard, "speed mesh_kind"
+        computed, kinds = self.response, "speed mesh_kind"
         words = "acceleration at the sensor, single-sided amplitude"
         at = partial(np.interp, self.resonances["resonance_speed"] * RPM, self.input_speed)
         there = {

@@ -659,7 +659,7 @@ def solve_runup(case: Case, modes: ModesResult, *, progress: Progress = silent) 
     forces = modal_forces(basis, excitation, count, output=field)
     crossed = crossings(forces, slowest, fastest, up_to if given is None else math.inf)
     resonance = crossed.mesh_frequency / speed_of.mesh_frequency
-    expected_level, damping = forces.heard[crossed.row, crossed.harmonic - 1], forces.damping_ratio[crossed.row]
+    expected_level, damping = forces.output_level[crossed.row, crossed.harmonic - 1], forces.damping_ratio[crossed.row]
     speeds = refined_speeds(np.linspace(first, last, case.runup.count), resonance, expected_level, damping)
     speeds = merged_speeds(operating[checked][(operating[checked] >= first) & (operating[checked] <= last)], speeds)
     beside = operating[np.abs(operating[:, None] - resonance).argmin(axis=0)]
@@ -704,7 +704,7 @@ def solve_runup(case: Case, modes: ModesResult, *, progress: Progress = silent) 
         level_change=change,
         compared_to=compared_to,
         carrier_speed=carrier,
-        heard=levels,
+        response=levels,
         resonances={**resonances_, "resonance_alone": alone[0], "operating_alone": alone[1]},
         ring_teeth=case.ring.teeth,
         sensor_angle=case.housing.sensor_angle,

@@ -36,7 +36,7 @@ class CasingModel:
         Places of all that sits in the casing [m], by name, see `casing_seats`.
     standing : frozenset of str
         Names of those that are in what stands still instead.
-    own : mapping of str to int
+    seat_stations : mapping of str to int
         Stations of seats that have one: those of an elastic casing.
     feet : tuple of StationSprings
         Of every foot: six rows of the motion of its place against the ground.
@@ -51,7 +51,7 @@ class CasingModel:
     centre: np.ndarray
     seats: Mapping[str, np.ndarray]
     standing: frozenset[str]
-    own: Mapping[str, int]
+    seat_stations: Mapping[str, int]
     feet: tuple[StationSprings, ...]
     foot_stiffness: np.ndarray
     foot_offsets: np.ndarray

@@ -59,7 +59,8 @@ def seat_motions(case: GearboxCase, casing: CasingModel, motion: np.ndarray) -> 
         name = bearing_name(bearing, number)
         if bearing.outer_shaft is None:
             link = rigid_link(casing.seats[name] - casing.centre)
-            of_seat = motion[casing.own[name]] if name in casing.own else link @ motion[casing.station]
+            station = casing.seat_stations.get(name)
+            of_seat = link @ motion[casing.station] if station is None else motion[station]
             motions[number] = 0.0 if name in casing.standing else of_seat[:3]
     return motions
 

@@ -314,8 +314,8 @@ class _Builder:
         """Place in the casing of a seat; one of what stands still."""
         if self.casing is None or name in self.casing.standing:
             return Seat(GROUND)
-        if name in self.casing.own:
-            return Seat(self.casing.own[name])
+        if name in self.casing.seat_stations:
+            return Seat(self.casing.seat_stations[name])
         offset = self.casing.seats[name] - np.asarray(self.casing.centre)
         return Seat(self.casing.station, (float(offset[0]), float(offset[1]), float(offset[2])))
 

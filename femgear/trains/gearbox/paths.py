@@ -86,7 +86,7 @@ def casing_paths(state: Deflection) -> CasingPaths | None:
         return None
     assembly, _, slices = linear_system(state)
     loss = 1.0 + 2j * model.case.modes.damping_ratio
-    stations = {*casing.stations, *casing.own.values()}
+    stations = {*casing.stations, *casing.seat_stations.values()}
     places = np.array([6 * station + way for station in casing.stations for way in range(6)])
     parts = [part for part in _parts(state, assembly, slices) if not stations.isdisjoint(part[1])]
     onto = assembly.led[:, places].T
@@ -186,7 +186,7 @@ def forces_on_casing(
     assembly, casing = model.assembly, model.casing
     assert casing is not None
     of_meshes = structured.of_meshes
-    for station in {*casing.stations, *casing.own.values()}:
+    for station in {*casing.stations, *casing.seat_stations.values()}:
         waves = np.array([row_waves(row, structured.orbit, station, assembly.places) for row in structured.rows])
         if not waves.any():
             continue

@@ -323,9 +323,9 @@ class _ExcitingPart:
         return (3 * np.array(pins, int)[:, None] + np.arange(3)).ravel()
 
     @property
-    def own(self) -> slice:
+    def exciting_kinds(self) -> slice:
         """Kinds of meshes of the running stage that excite."""
-        return slice(None) if self.forces is None else self.forces.own
+        return slice(None) if self.forces is None else self.forces.exciting_kinds
 
 
 def _exciting_parts(
@@ -344,7 +344,7 @@ def _exciting_parts(
             kinds = [kind for kind in left if kind in together]
             left = [kind for kind in left if kind not in together]
             for group in branch_kinds(state, running, kinds, excitations, phases, rings):
-                names = [running.kinds[together[forces.own.start]] for _, forces in group]
+                names = [running.kinds[together[forces.exciting_kinds.start]] for _, forces in group]
                 yield [_kind_part(state.model, of_kind, *made) for of_kind, made in zip(names, group, strict=True)]
             done |= {name for kind in kinds for name in running.kinds[kind]}
     for stage in staged:
@@ -454,7 +454,7 @@ class _PartLines:
         precision = np.complex64 if speeds > _MANY else np.complex128
         self.motion = np.zeros((speeds, self.measured, len(self.line)), precision)
         count = len(running.paths.planet_angles)
-        self.mean_force = running.excitation.force.mean(axis=1).reshape(-1, count)[part.own].mean(axis=1)
+        self.mean_force = running.excitation.force.mean(axis=1).reshape(-1, count)[part.exciting_kinds].mean(axis=1)
         kinds = len(self.mean_force)
         self.force, self.dynamic_force = np.zeros((speeds, kinds, 3)), np.zeros((speeds, kinds))
         self.approach = np.full((speeds, len(outputs) - self.measured), np.nan)
@@ -481,7 +481,7 @@ class _PartLines:
         if part.forces is not None:
             self.motion[i][:, few] += _on_pins(part.forces, model, response, self.measured, there).T
             _add_branch_meshes(self.approach[i], part.forces, model, response)
-        low, high, self.dynamic_force[i] = _extremes(response, part.own)
+        low, high, self.dynamic_force[i] = _extremes(response, part.exciting_kinds)
         self.force[i] = np.stack([self.mean_force, self.mean_force + high, self.mean_force + low], axis=1)
         self.figures[:, i] = response.residual, response.radius, *response.tail, response.products
 
@@ -492,7 +492,7 @@ class _PartLines:
         harmonic = self.line / self.periods
         order = harmonic * mesh_order + self.band * carrier_order
         count = len(running.paths.planet_angles)
-        stiffness = running.excitation.stiffness.reshape(running.kinds, count, -1)[part.own]
+        stiffness = running.excitation.stiffness.reshape(running.kinds, count, -1)[part.exciting_kinds]
         residual, radius, tail, outer, products = self.figures
         lines = part.name, harmonic, self.band, order, self.motion, self.force
         means = stiffness.mean(axis=(1, 2)), stiffness.std(axis=2).max(axis=1), self.dynamic_force, self.approach

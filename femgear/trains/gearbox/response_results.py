@@ -48,12 +48,12 @@ _KINDS = ("sun", "ring")
 class GearboxResponseResult(StageResult):
     """Response of a gearbox at some speeds.
 
-    ``found`` is the response; ``whole`` keeps the lines of bearings too; ``unresolved`` counts the resonances of a
+    ``response`` is the response; ``whole`` keeps the lines of bearings too; ``unresolved`` counts the resonances of a
     run-up whose peaks its speeds miss, ``resonances`` are all of them. ``frictionless`` is the response without the
     friction of the teeth, where that acts. ``longer`` is the response with a longer excitation at some of the speeds.
     """
 
-    found: GearboxResponse
+    response: GearboxResponse
     whole: bool
     unresolved: int = 0
     resonances: GearboxResonances | None = None
@@ -63,12 +63,12 @@ class GearboxResponseResult(StageResult):
     @property
     def residual(self) -> float:
         """Largest residual of the equations of all stages."""
-        return max((float(stage.residual.max()) for stage in self.found.stages), default=math.nan)
+        return max((float(stage.residual.max()) for stage in self.response.stages), default=math.nan)
 
     @property
     def message(self) -> str:
         """How the solutions were found."""
-        products = max((int(stage.products.max()) for stage in self.found.stages), default=0)
+        products = max((int(stage.products.max()) for stage in self.response.stages), default=0)
         return f"every stage in the structure of all the rest, GMRES with at most {products} products"
 
     @staticmethod
@@ -78,7 +78,7 @@ class GearboxResponseResult(StageResult):
 
     def contents(self) -> Contents:
         """Collect the contents of dynamics.nc or runup.nc."""
-        response = self.found
+        response = self.response
         model = response.deflection.model
         sensors, bearings = len(gearbox_sensors(model.case)), len(model.bearings)
         forces = slice(sensors, sensors + 3 * bearings)

@@ -353,14 +353,14 @@ def _distribution(state: Deflection) -> dict[str, tuple]:
 
 @dataclass(frozen=True, eq=False)
 class GearboxModesResult(StageResult):
-    """Modes of the whole gearbox, ``found``, about the loaded state of one load case."""
+    """Modes of the whole gearbox, ``gearbox_modes``, about the loaded state of one load case."""
 
-    found: GearboxModes
+    gearbox_modes: GearboxModes
 
     @property
     def modes(self):
         """The modes themselves."""
-        return self.found.modes
+        return self.gearbox_modes.modes
 
     @property
     def message(self) -> str:
@@ -374,7 +374,7 @@ class GearboxModesResult(StageResult):
 
     def contents(self) -> Contents:
         """Collect the contents of modes.nc."""
-        solved = self.found
+        solved = self.gearbox_modes
         modes, model, campbell = solved.modes, solved.deflection.model, solved.campbell
         critical, shown, names = campbell.critical, model.places, [stage.name for stage in model.stages]
         variables = mode_entries(modes) | {

@@ -39,7 +39,7 @@ class GearboxResonances:
     ----------
     speed : (c,) array
         Of the reference shaft [rad/s].
-    heard : (c,) array
+    output_level : (c,) array
         What is heard far above the mode, r.m.s. over all sensors [m/s^2]: `femgear.solvers.linear.resonances`.
         Without sensors that of the approach of the flanks.
     damping : (c,) array
@@ -53,7 +53,7 @@ class GearboxResonances:
     """
 
     speed: np.ndarray
-    heard: np.ndarray
+    output_level: np.ndarray
     damping: np.ndarray
     stage: tuple[str, ...]
     harmonic: np.ndarray
@@ -62,7 +62,7 @@ class GearboxResonances:
     @property
     def expected(self) -> np.ndarray:
         """Level (resonances,) that is expected, but for a factor that is the same of all."""
-        return self.heard / np.where(self.damping > 0.0, self.damping, np.inf)
+        return self.output_level / np.where(self.damping > 0.0, self.damping, np.inf)
 
 
 def gearbox_resonances(
@@ -104,7 +104,7 @@ def gearbox_resonances(
         output = at_sensors if at_sensors.shape[1] else own_modes.mesh_deflection.T
         forces = modal_forces(own_modes, excitation, harmonics, output=output)
         crossed = crossings(forces, mesh_turns * slowest, mesh_turns * fastest, up_to)
-        strength = forces.heard[crossed.row, crossed.harmonic - 1]
+        strength = forces.output_level[crossed.row, crossed.harmonic - 1]
         modal = forces.damping_ratio[crossed.row], crossed.harmonic, forces.frequency[crossed.row]
         parts.append(np.array([crossed.mesh_frequency / mesh_turns, strength, *modal, crossed.row]))
         names += [joint.get(stage.name, stage.name)] * len(crossed.row)
@@ -157,6 +157,6 @@ def run_up_speeds(steps_of_speed: np.ndarray, resonances: GearboxResonances) -> 
         return steps_of_speed, 0
     expected = resonances.expected
     matters = expected > _MATTERS * expected.max(initial=0.0)
-    places = resonances.speed[matters], resonances.heard[matters], resonances.damping[matters]
+    places = resonances.speed[matters], resonances.output_level[matters], resonances.damping[matters]
     speeds = refined_speeds(steps_of_speed, *places)
     return speeds, unresolved(speeds, *places) if matters.any() else 0

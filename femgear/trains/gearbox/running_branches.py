@@ -54,13 +54,13 @@ class BranchForces:
     pins : mapping of int to (int, (n,) int array, (n, 3) array)
         Branch of every bearing on a pin, by its number, its contact points, and what unit forces of these do to the
         planet radially, tangentially and along z [1].
-    own : slice
+    exciting_kinds : slice
         Kinds of the running stage that excite: one.
     """
 
     meshes: Mapping[int, tuple[int, int]]
     pins: Mapping[int, tuple[int, np.ndarray, np.ndarray]]
-    own: slice
+    exciting_kinds: slice
 
 
 @dataclass(frozen=True)
@@ -192,7 +192,8 @@ def branch_kinds(
         alike = np.array_equal(mean, first.stiffness[: len(together)]) and paths == first.paths
         if alike and (excitation.source is None) == (first.rubbing is None):
             stage = replace(first, excitation=excitation, sense=sense)
-            made[0].append((replace(structured, running=stage), replace(forces, own=slice(of_kind, of_kind + 1))))
+            of_forces = replace(forces, exciting_kinds=slice(of_kind, of_kind + 1))
+            made[0].append((replace(structured, running=stage), of_forces))
         else:
             made.append([branch_stage(state, running, kind, excitations, phases, rings)])
     return made
@@ -208,7 +209,7 @@ class _Branch:
     """The first branch of a set: its contact points and matrices, along axes that are radial at its first planet."""
 
     def __init__(self, state: Deflection, running: RunningSet, stations: Sequence[int]):
-        self.found, self.running, self.model = state, running, state.model
+        self.state, self.running, self.model = state, running, state.model
         self.place = {station: n for n, station in enumerate(stations)}
         self.size = 6 * len(stations)
         assembly, _, self.tangents = linear_system(state)
@@ -265,9 +266,9 @@ class _Branch:
             along = np.zeros((6, 6))
             for psi, numbers in zip(self.running.angles, self.running.pins, strict=True):
                 axes = np.kron(np.eye(2), pin_axes(psi))
-                tangent = self.found.bearing_stiffness[numbers[at]]
+                tangent = self.state.bearing_stiffness[numbers[at]]
                 along += axes @ np.where(np.isinf(tangent), 0.0, tangent) @ axes.T / len(self.running.pins)
-            rigid = np.isinf(np.diag(self.found.bearing_stiffness[bearing]))
+            rigid = np.isinf(np.diag(self.state.bearing_stiffness[bearing]))
             values, vectors = np.linalg.eigh(along)
             held = values > _HELD * max(values.max(), np.finfo(float).tiny)
             ways = np.vstack([vectors[:, held].T, np.eye(6)[rigid]])

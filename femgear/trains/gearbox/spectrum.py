@@ -70,7 +70,7 @@ def solve_box_transient(
         if variant == ALL_MOTIONS:
             mode = mesh_mode(model, outline.highest_mesh * transient.harmonics)
         tell_share = lambda share, done=done: progress("transient", done + share, len(variants))  # noqa: E731
-        motions[variant] = integrate(model, every=outline.every, told=tell_share)
+        motions[variant] = integrate(model, every=outline.every, progress=tell_share)
     return TransientResult(motions, mode)
 
 

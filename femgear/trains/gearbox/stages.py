@@ -254,7 +254,7 @@ def _port_texts(case, flow, power, shaft: str) -> tuple[str, str]:
 
 
 def _response_verdict(result: GearboxResponseResult) -> dict:
-    return {"speeds": len(result.found.speed), "stages": [stage.name for stage in result.found.stages]}
+    return {"speeds": len(result.response.speed), "stages": [stage.name for stage in result.response.stages]}
 
 
 def loaded_stages(
@@ -413,7 +413,7 @@ GEARBOX = Train(
     draft_casing=draft_casing,
     dynamic_model=gearbox_dynamic_model,
     check_model=check_dynamic_model,
-    heard=heard_stages,
+    recorded_stages=heard_stages,
     stands_in={"static": "deflection", "life": "deflection", "housing": "dynamics"},
     judgements=gearbox_judgements,
     duty=gearbox_duty,

@@ -103,7 +103,7 @@ class GearboxInTime:
 
 
 def gearbox_in_time(
-    found: Deflection, transient: TransientSection, *, steps: Steps | None = None, mean_damping: bool = True
+    state: Deflection, transient: TransientSection, *, steps: Steps | None = None, mean_damping: bool = True
 ) -> GearboxInTime:
     """Make a gearbox ready for integration in time about its loaded state.
 
@@ -112,11 +112,11 @@ def gearbox_in_time(
     CaseError: planets that are not equally spaced on a carrier that turns (E-TURNING), several motions that nothing
     holds (E-MECHANISM), a stiffness that is not positive (E-STIFFNESS).
     """
-    model = found.model
-    excitations = all_excitations(found, steps=steps)
+    model = state.model
+    excitations = all_excitations(state, steps=steps)
     options: dict[str, Any] = {"harmonics": transient.harmonics, "separates": transient.contact_loss}
     options["mean_damping"] = mean_damping
-    box = nonlinear_gearbox(found, excitations, **options, back_flanks=transient.back_flanks, turning=transient.turning)
+    box = nonlinear_gearbox(state, excitations, **options, back_flanks=transient.back_flanks, turning=transient.turning)
     shaft = reference_shaft(model)
     system = box.problem.system
     made = GearboxInTime(box, _without_contacts(box), shaft)
@@ -176,7 +176,9 @@ class GearboxMotion:
     shafts: tuple[str, ...]
 
 
-def integrate(model: GearboxInTime, *, every: int = 1, lowpass: bool = True, told=lambda share: None) -> GearboxMotion:
+def integrate(
+    model: GearboxInTime, *, every: int = 1, lowpass: bool = True, progress=lambda share: None
+) -> GearboxMotion:
     """Integrate the motion of a gearbox as its case asks for it; one record of ``every`` so many steps.
 
     ConvergenceError: the motion outgrows the numbers, or all sense (E-DIVERGED).
@@ -195,7 +197,7 @@ def integrate(model: GearboxInTime, *, every: int = 1, lowpass: bool = True, tol
             speed=model.speed,
             start=transient.start,
             outputs=np.array([model.box.motion[6 * model.box.deflection.model.first[name] + 5] for name in shafts]),
-            records=Records(every, lowpass=lowpass, told=told),
+            records=Records(every, lowpass=lowpass, progress=progress),
             contact_loss=transient.contact_loss,
         )
     except (CaseError, ConvergenceError) as error:

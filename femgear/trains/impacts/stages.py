@@ -170,12 +170,12 @@ class SweepResult(StageResult):
 class ChaosResult(StageResult):
     """Lyapunov exponents of the motions of the ``case`` over the frequency ``ratio`` (r,).
 
-    ``found`` has exponents and a section for every ratio, ``sections`` longer ones for some, with their ratio.
+    ``exponents`` has exponents and a section for every ratio, ``sections`` longer ones for some, with their ratio.
     """
 
     case: GearPairCase
     ratio: np.ndarray
-    found: list[LyapunovExponents]
+    exponents: list[LyapunovExponents]
     sections: list[tuple[float, LyapunovExponents]]
 
     @property
@@ -185,7 +185,7 @@ class ChaosResult(StageResult):
 
     def contents(self) -> Contents:
         """Collect the contents of chaos.nc; exponents are per unit of time 1 / omega_n."""
-        ratio, exponents = self.ratio, self.found
+        ratio, exponents = self.ratio, self.exponents
         variables = _numbers(
             "ratio",
             exponent=(ratio * [result.largest for result in exponents], f"largest Lyapunov exponent {_RATE}"),

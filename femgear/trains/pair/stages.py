@@ -375,7 +375,7 @@ def solve_pair_runup(case: PairCase, modes: PairModesResult) -> PairRunupResult:
     forces = modal_forces(basis, modes.excitation, int(most[0, 0]), output=row[:, None])
     crossed = crossings(forces, first * per_speed, last * per_speed, math.inf)
     resonance, mode = crossed.mesh_frequency / per_speed, forces.mode[crossed.row]
-    expected_level, damping = forces.heard[crossed.row, crossed.harmonic - 1], forces.damping_ratio[crossed.row]
+    expected_level, damping = forces.output_level[crossed.row, crossed.harmonic - 1], forces.damping_ratio[crossed.row]
     speeds = refined_speeds(np.linspace(first, last, case.runup.count), resonance, expected_level, damping)
     speeds = merged_speeds(operating[(operating >= first) & (operating <= last)], speeds)
     harmonics = _harmonics(case, basis, speeds * per_speed)

@@ -86,7 +86,7 @@ def test_a_mode_in_resonance_moves_as_its_force_says(planet_set, planet_excitati
         force = np.linalg.norm(acceleration) * 2 * modes.damping_ratio[first]
         assert force == pytest.approx(forces.force[g, h - 1], rel=0.01)
         heard = np.linalg.norm(acceleration * np.diag(outputs)[own]) / np.sqrt(2)
-        assert heard == pytest.approx(forces.heard[g, h - 1] / (2 * modes.damping_ratio[first]), rel=0.01)
+        assert heard == pytest.approx(forces.output_level[g, h - 1] / (2 * modes.damping_ratio[first]), rel=0.01)
 
 
 def test_crossings_are_those_between_two_frequencies(planet_set, planet_excitation):

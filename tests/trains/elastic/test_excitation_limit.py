@@ -243,5 +243,5 @@ def test_run_up_and_operating_speeds_have_one_excitation(case, modes):
     ends = {"runup.from": "1500 rpm", "runup.to": "1520 rpm", "runup.count": 2}
     entries = held(case, **{"operation.speeds": ["1500 rpm"]} | ends)
     runup = solve_runup(entries, modes)
-    assert runup.heard.level[0] == pytest.approx(42.7, rel=0.02)
+    assert runup.response.level[0] == pytest.approx(42.7, rel=0.02)
     assert runup.excitation_limit == pytest.approx(modes.reach, rel=0.03)

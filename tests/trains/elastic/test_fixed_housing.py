@@ -130,13 +130,13 @@ def test_run_up_is_that_of_the_housing(before):
     found = solve_runup(case, before[1])
     at = np.flatnonzero(np.isclose(found.input_speed / RPM, 3100.0))
     result = heard(case, *before)
-    assert found.heard.level[at] == pytest.approx(order_level(result.exact)[1:], rel=1e-9)
-    order, lines = found.heard.order, found.heard.lines[at[0]]
+    assert found.response.level[at] == pytest.approx(order_level(result.exact)[1:], rel=1e-9)
+    order, lines = found.response.order, found.response.lines[at[0]]
     same = np.isin(result.exact.order, order)
     np.testing.assert_allclose(lines, result.exact.acceleration[1, same], atol=1e-6 * np.abs(lines).max())
     forces = heard_forces(case, before)
-    assert found.heard.force_peak[at[0]] == pytest.approx(forces.max(axis=1), rel=1e-3)
-    assert found.heard.lowest_force[at[0]] == pytest.approx(forces.min(), rel=1e-3)
+    assert found.response.force_peak[at[0]] == pytest.approx(forces.max(axis=1), rel=1e-3)
+    assert found.response.lowest_force[at[0]] == pytest.approx(forces.min(), rel=1e-3)
     data = found.dataset()
     assert "in the housing that stands still" in " ".join(describe_runup(data).notes)
     lines, pressure = run_up_lines(data, result.dataset().attrs)
@@ -149,10 +149,10 @@ def test_run_up_in_two_processes_is_the_same(before, monkeypatch):
     ends = {"runup.from": "3000 rpm", "runup.to": "3100 rpm", "runup.count": 4}
     case = reference(**{"housing.support": FEET} | ends)
     monkeypatch.setattr(stages, "_PART", 1.0)  # every speed is a part
-    alone, told = solve_runup(case, before[1]).heard, []
+    alone, told = solve_runup(case, before[1]).response, []
     monkeypatch.setattr(stages, "_FEW_SPEEDS", 1)
     monkeypatch.setattr(second_process, "second_core", lambda: True)
-    found = solve_runup(case, before[1], progress=lambda *one: told.append(one)).heard
+    found = solve_runup(case, before[1], progress=lambda *one: told.append(one)).response
     for name in ("level", "force_peak", "lowest_force", "order", "lines"):
         assert np.array_equal(getattr(found, name), getattr(alone, name)), name
     in_housing = [done for _, done, _ in told[1:]]  # the first one is the foundation's

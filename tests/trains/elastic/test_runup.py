@@ -63,14 +63,14 @@ def test_at_its_speeds_it_is_the_dynamics_and_the_housing(case, static, modes, f
     same = with_values(case, {"operation.speeds": speeds, "housing.published": None})
     dynamics = solve_dynamics(same, static, modes)
     level = order_level(solve_housing(same, dynamics).exact)
-    assert found.heard.level[chosen] == pytest.approx(level, rel=1e-9)
+    assert found.response.level[chosen] == pytest.approx(level, rel=1e-9)
     assert found.excitation_limit[chosen] == pytest.approx(dynamics.excitation_limit, rel=1e-12)
     force = dynamics.response.force
     peak = sample(force, 4 * force.shape[-1]).max(axis=-1)
     for kind, own in enumerate((slice(3), slice(3, 6))):
-        assert found.heard.force_rms[chosen, kind] == pytest.approx(fluctuation(force)[:, own].max(axis=1), rel=1e-9)
+        assert found.response.force_rms[chosen, kind] == pytest.approx(fluctuation(force)[:, own].max(axis=1), rel=1e-9)
         # instants of another number of harmonics
-        assert found.heard.force_peak[chosen, kind] == pytest.approx(peak[:, own].max(axis=1), rel=1e-3)
+        assert found.response.force_peak[chosen, kind] == pytest.approx(peak[:, own].max(axis=1), rel=1e-3)
     assert np.isclose(found.input_speed / RPM, 3100.0).any()
 
 
@@ -78,7 +78,7 @@ def test_level_is_the_root_mean_square_of_the_lines(found, data):
     lines = data["lines_real"].values + 1j * data["lines_imag"].values
     assert np.sqrt(0.5 * (np.abs(lines) ** 2).sum(axis=1)) == pytest.approx(data["level"].values, rel=1e-5)
     # three planets in phase: multiples of three alone
-    assert not (found.heard.order % 3).any()
+    assert not (found.response.order % 3).any()
 
 
 def test_equal_planets_in_phase_are_excited_in_rotational_modes_alone(data):
@@ -134,12 +134,12 @@ def test_a_narrow_peak_between_two_speeds_is_found(case, static):
     )
     modes = solve_modes(light, static)
     found = solve_runup(light, modes)
-    peak = found.input_speed[found.heard.level.argmax()] / RPM
+    peak = found.input_speed[found.response.level.argmax()] / RPM
     window = {"runup.from": f"{peak - 30} rpm", "runup.to": f"{peak + 30} rpm", "runup.count": 121}
     dense = solve_runup(with_values(light, window), modes)
-    assert found.heard.level.max() == pytest.approx(dense.heard.level.max(), rel=0.05)
+    assert found.response.level.max() == pytest.approx(dense.response.level.max(), rel=0.05)
     coarse = np.isin(np.round(found.input_speed / RPM, 6), np.linspace(2000, 3000, 11))
-    assert found.heard.level[coarse].max() < 0.7 * found.heard.level.max()
+    assert found.response.level[coarse].max() < 0.7 * found.response.level.max()
 
 
 def test_default_ends_and_refusals(case):
@@ -221,7 +221,7 @@ def test_the_verdict_states_factors_stresses_and_what_they_assume(case, files, f
     assert first.notes[0] == "teeth and pins without errors"
     assert "static.members" not in notes and "at one instant" not in notes + " ".join(told)
     at_3100 = np.argmin(np.abs(found.input_speed / RPM - 3100.0))
-    sun, ring = found.heard.dynamic_factor[at_3100]
+    sun, ring = found.response.dynamic_factor[at_3100]
     assert told["largest dynamic factor K_v, at operating speeds"] == f"sun-planet {sun:.3f}, planet-ring {ring:.3f}"
     assert told["planet load factor K_gamma, mean over all positions"] == "sun-planet 1.000, planet-ring 1.000"
     nominal = files["stress"]["iso_root_stress"].values[0, 1]

@@ -264,7 +264,7 @@ def test_a_ring_in_the_casing_of_a_file(tmp_path):
     tables["shaft"][1].pop("axis")
     del tables["gravity"]
     found = solved(tmp_path, tables)
-    ring = found.motion.reshape(-1, 6)[found.model.casing.own["ring of set"]]
+    ring = found.motion.reshape(-1, 6)[found.model.casing.seat_stations["ring of set"]]
     # the torque of the ring turns its seat by that of its path beyond the casing
     torque = found.model.load.reshape(-1, 6)[:2, 5].sum()
     station = found.model.casing.station
@@ -278,7 +278,7 @@ def test_a_ring_in_the_casing_of_a_file(tmp_path):
     motion = data["displacement"].sel(station="seat A").values[0, :3]
     assert data["seat_displacement"].values[0, 0] == pytest.approx(motion)
     modes = solve_box_modes(read(tmp_path, tables), solve_deflections(read(tmp_path, tables)))
-    found = modes.found
+    found = modes.gearbox_modes
     assert found.kinetic.sum(axis=0) == pytest.approx(np.ones(found.kinetic.shape[1]), rel=1e-9)
     elastic = found.modes.frequency > 0.0
     assert found.strain.sum(axis=0)[elastic] == pytest.approx(np.ones(elastic.sum()), rel=1e-9)

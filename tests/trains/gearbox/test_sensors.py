@@ -96,7 +96,7 @@ def test_sensors_of_a_file_move_as_their_nodes(tmp_path):
     assert names == ["body", "A up", "C along"]
     found = solve_deflection(case)
     moved, stations = sensor_rows(found.model) @ found.motion, found.motion.reshape(-1, 6)
-    own = found.model.casing.own
+    own = found.model.casing.seat_stations
     assert moved[1] == pytest.approx(stations[own["A"], 1], rel=1e-9)
     assert moved[2] == pytest.approx(-stations[own["C"], 2], rel=1e-9)
     # in balance the body is where its springs to seats and feet hold it: their forces sum to zero
@@ -112,7 +112,7 @@ def test_sensors_of_a_file_move_as_their_nodes(tmp_path):
 
 
 def spring_motion(found, name):
-    station = found.model.casing.own[name]
+    station = found.model.casing.seat_stations[name]
     return np.asarray(found.model.assembly.places)[station], found.motion.reshape(-1, 6)[station]
 
 
@@ -141,7 +141,7 @@ def test_results_have_the_motion_of_every_sensor():
     modes = solve_box_modes(case, deflection)
     shapes = modes.dataset()
     assert shapes["sensor_shape"].dims == ("sensor", "mode")
-    assert shapes["sensor_shape"].values == pytest.approx(rows @ modes.found.motion)
+    assert shapes["sensor_shape"].values == pytest.approx(rows @ modes.gearbox_modes.motion)
     (block,) = describe_modes_at_sensors(shapes)
     size, hertz = np.abs(shapes["sensor_shape"].values[0]), shapes["frequency"].values
     first = int(np.where(hertz > 0.0, size, 0.0).argmax())
