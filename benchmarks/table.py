@@ -27,33 +27,23 @@ this page; rows of ROSS need `pip install "femgear[bench]"`.
 
 """
 
-MISSED = """## What misses its limit, and what was tried
+MISSED = """## What misses its limit, and why
 
-* **Static and modal stage in 25 slices**. Condensing the waves across the width once for both stages, and gear by gear
-  for variants, halved the time. Panel sizes of SuperLU, and 3 to 16 positions at once, brought nothing. Nor did sharing
-  positions between two processes (3.06 s either way): 281 positions come in six walks, each as short as copying
-  the process.
-* **Five planets in 25 slices** take 1.9 times as long as six at 16 positions, 1.8 times at 64; the aim is 1.3. Solving
-  each state once brought 7.2 to 1.9, gathering single rows of the compliance 8.0 to 6.2 ms a step. With more positions
-  a fifth of them is a larger batch. Ten meshes are one system of some 450 loaded slices, six planets in phase one
-  of 100.
-* **Helical teeth out of phase**. Tables of the compliance between slices more than halved the time. Blocks of 25 to 400
-  tooth pairs take 3.06 to 3.55 s for the static stage; 400 stays. Two processes with two positions a task take 0.75 of
-  the time.
-* **Whole computation**. Fewer modules, and solutions shared between stages. Threads for the three gears bring 0.25 to
-  0.19 s. A second process for them brings 0.18 s and is taken: 0.77 for 0.84 s in alternate runs.
-* **Run without pictures, first line, script**. Leaving out xarray and pandas brought 4.8 to 3.2 s, leaving out the
-  garbage collector nothing. Byte code lies on disk, and a run-up has two processes. Imports are a quarter of the time.
-* **Answers after a change**. Stability of a turn is computed only when asked for: five speeds on bolts went from 5.1 to
-  1.8 s. All steps of a case share one cache. Starting from the positions of the answer before was dropped, as the
-  answer would depend on it. All positions of a loaded period, some 280, take more than 0.1 s in any way.
+* **Static and modal stage in 25 slices**. Waves across the width are condensed once for both stages, and gear by gear
+  for variants. Sharing positions between two processes brings nothing (3.06 s either way): 281 positions come in six
+  walks, each as short as copying the process.
+* **Five planets in 25 slices** take 1.9 times as long as six at 16 positions, 1.8 times at 64; the aim is 1.3. Ten
+  meshes are one system of some 450 loaded slices, six planets in phase one of 100.
+* **Helical teeth out of phase**. Blocks of 25 to 400 tooth pairs take 3.06 to 3.55 s for the static stage. Two
+  processes with two positions a task take 0.75 of the time.
+* **Whole computation**. A second process for the three gears brings 0.84 to 0.77 s.
+* **Run without pictures, first line, script**. Imports are a quarter of the time.
+* **Answers after a change**. All positions of a loaded period, some 280, take more than 0.1 s in any way.
 * **Sliders**. Planets that are not alike have three times as many positions to solve, 0.3 s with a pin error. Its draft
-  of 24 positions takes 0.13 to 0.16 s. Leaving garbage uncollected until an answer is there saves a fifth. The fixed
-  piece of work took 121 ms with these rows.
-* **Run with pictures**. The page comes before the pictures, in two processes, without animation. Layout of the axes is
-  a quarter of the time.
-* **Drivetrain, 60 s at 20 kHz**. Steps are one linear map between contact changes. Mesh matrices differ at every
-  instant, and their product with two rows of 96 is what remains.
+  of 24 positions takes 0.13 to 0.16 s. The fixed piece of work took 121 ms with these rows.
+* **Run with pictures**. Layout of the axes is a quarter of the time.
+* **Drivetrain, 60 s at 20 kHz**. Mesh matrices differ at every instant, and their product with two rows of 96 is what
+  remains.
 
 A million as-built sets of `cases/tolerances/3um.toml` took 400 s in two processes with 0.47 GB; the aim is 240 s.
 Sets in 25 slices, with leads of the sun as tolerances, took 56 s for 10,000, with 0.73 GB; the aim is 60 s.

@@ -202,7 +202,7 @@ class SetDamping:
 
     def single(self) -> SetDamping:
         """The same in single precision."""
-        names = "shape", "own", "path"
+        names = "shape", "structure_damping", "path"
         residues = tuple(
             replace(
                 residue,
