@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import warnings
 from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
@@ -356,6 +357,12 @@ class GearboxModesResult(StageResult):
     """Modes of the whole gearbox, ``gearbox_modes``, about the loaded state of one load case."""
 
     gearbox_modes: GearboxModes
+
+    @property
+    def found(self) -> GearboxModes:
+        """Former name of `gearbox_modes`, until the next minor release."""
+        warnings.warn("found is called gearbox_modes now", DeprecationWarning, stacklevel=2)
+        return self.gearbox_modes
 
     @property
     def modes(self):
