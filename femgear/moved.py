@@ -1,6 +1,7 @@
 """Former names of modules and of what is in them, until the next minor release, with a DeprecationWarning.
 
-`FormerNames` finds modules, `former_names` gives a module those of its functions and classes.
+`FormerNames` finds modules, `former_names` gives a module those of its functions and classes, `former_keywords` those
+of the parameters of one.
 """
 
 from __future__ import annotations
@@ -8,9 +9,10 @@ from __future__ import annotations
 import sys
 import warnings
 from collections.abc import Callable, Mapping
+from functools import wraps
 from importlib import import_module
 from importlib.util import spec_from_loader
-from typing import Any
+from typing import Any, TypeVar
 
 MOVED = {
     "femgear.trains.protocol": "femgear.stages.protocol",
@@ -30,6 +32,9 @@ MOVED = {
     "femgear.case.mistakes": "femgear.case.messages",
 }
 """Former and new names; of a folder all its modules."""
+
+
+_Callable = TypeVar("_Callable", bound=Callable)
 
 
 class FormerNames:
@@ -68,6 +73,31 @@ def former_names(module: str, renamed: Mapping[str, object]) -> Callable[[str], 
         return new
 
     return find
+
+
+def former_keywords(**renamed: str) -> Callable[[_Callable], _Callable]:
+    """Decorate a function or a dataclass whose parameters had other names: it takes them by those too.
+
+    ``renamed`` are the new names by the former ones.
+    """
+
+    def decorate(target: Any) -> Any:
+        call: Any = target.__init__ if isinstance(target, type) else target
+
+        @wraps(call)
+        def with_new_names(*arguments: Any, **keywords: Any) -> Any:
+            for former in renamed.keys() & keywords.keys():
+                text = f"{former} of {target.__name__} is called {renamed[former]} now"
+                warnings.warn(text, DeprecationWarning, stacklevel=2)
+                keywords[renamed[former]] = keywords.pop(former)
+            return call(*arguments, **keywords)
+
+        if not isinstance(target, type):
+            return with_new_names
+        target.__init__ = with_new_names
+        return target
+
+    return decorate
 
 
 def _new_name(former: str) -> str | None:

@@ -2,11 +2,12 @@
 
 import subprocess
 import sys
+from dataclasses import dataclass
 from importlib import import_module
 
 import pytest
 
-from femgear.moved import MOVED, former_names
+from femgear.moved import MOVED, former_keywords, former_names
 
 FORMER = """
 femgear.trains.protocol femgear.stages.protocol StageResult
@@ -57,3 +58,22 @@ def test_former_functions_and_classes_are_those_by_their_new_names(module, forme
 def test_another_name_is_not_there():
     with pytest.raises(AttributeError, match="no attribute"):
         former_names("femgear.curves", {"older": pytest})("newer")
+
+
+def test_former_names_of_parameters_are_taken_with_a_warning():
+    @former_keywords(told="progress")
+    def integrate(steps, *, progress=None):
+        return steps, progress
+
+    @former_keywords(heard="response")
+    @dataclass(frozen=True)
+    class Result:
+        response: int
+
+    assert integrate(2, progress=3) == (2, 3) and Result(4) == Result(response=4)
+    with pytest.warns(DeprecationWarning, match="told of integrate is called progress now"):
+        assert integrate(2, told=3) == (2, 3)
+    with pytest.warns(DeprecationWarning, match="heard of Result is called response now"):
+        assert Result(heard=4) == Result(4)
+    with pytest.raises(TypeError):
+        integrate(2, asked=3)

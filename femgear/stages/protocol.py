@@ -18,6 +18,7 @@ import scipy
 from femgear.case.dependencies import Entries, every_entry
 from femgear.errors import FemgearError
 from femgear.findings import by_severity, once
+from femgear.moved import former_keywords
 from femgear.report.tables import Block, listed
 from femgear.stages.judgements import Judgement, describe_judgements, joined_sentence
 from femgear.storage.contents import Contents, as_dataset
@@ -499,3 +500,7 @@ def joint_verdict(verdicts: Sequence[dict]) -> dict:
 def response_verdict(result: Any) -> dict:
     """Tell the stability of any result with a periodic response, for the manifest."""
     return {"stable": bool(np.all(result.stability.stable))}
+
+
+former_keywords(asked="case_if_requested")(Stage)
+former_keywords(heard="recorded_stages")(Train)

@@ -364,7 +364,7 @@ class _Level:
 
     Parameters
     ----------
-    found : Candidates
+    candidates : Candidates
         Cells that may touch.
     springs : PairSprings
         Compliance of the tooth pairs.

@@ -28,6 +28,7 @@ from femgear.case.sections import FORMAT
 from femgear.case.text import described, text_with_points
 from femgear.errors import CaseError
 from femgear.findings import Finding
+from femgear.moved import former_keywords
 from femgear.storage.results import Results, results_of
 from femgear.trains import registry
 
@@ -203,8 +204,9 @@ def _embedded_files(embed: Callable, data: dict, name: str) -> tuple[dict[str, s
             unread[error.key] = error
 
 
+@former_keywords(known="datasets")
 def open_results(
-    folder: str | os.PathLike, *, partial: bool = True, known: Mapping[str, xr.Dataset] | None = None
+    folder: str | os.PathLike, *, partial: bool = True, datasets: Mapping[str, xr.Dataset] | None = None
 ) -> Results:
     """Open the results of a run; of an interrupted one those stages that are complete, with a warning.
 
@@ -214,7 +216,7 @@ def open_results(
         That a run wrote.
     partial : bool
         Accept the results of an interrupted run.
-    known : mapping of str to Dataset, optional
+    datasets : mapping of str to Dataset, optional
         Contents of files that need not be read, by stage.
 
     Returns
@@ -228,7 +230,7 @@ def open_results(
         No folder, no manifest, a broken one or one of a newer femgear. ``E-RESULTS-INCOMPLETE``: an
         interrupted run and not ``partial``.
     """
-    return results_of(folder, read_case, partial=partial).with_known(known or {})
+    return results_of(folder, read_case, partial=partial).with_known(datasets or {})
 
 
 def with_value(case: Case, key: str, value: object) -> Case:

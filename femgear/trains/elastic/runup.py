@@ -200,7 +200,7 @@ class RunupResult(StageResult):
         looked at.
     compared_to : float
         [Hz]
-    heard : HeardSpeeds
+    response : HeardSpeeds
         Levels, forces and lines at these speeds.
     resonances : mapping
         Variables of runup.nc of the resonances, (c,) each.

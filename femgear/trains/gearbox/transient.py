@@ -16,6 +16,7 @@ import numpy as np
 
 from femgear.case.dependencies import Steps
 from femgear.errors import CaseError, ConvergenceError
+from femgear.moved import former_keywords
 from femgear.solvers.time.flank_motion import MarchedRun, Records, march_flanks
 from femgear.solvers.time.free_turn import TorqueHistory
 from femgear.solvers.time.spun_system import BACK, DRIVE, SPRING, ContactGroup, SpunSystem, free_rotation, spun_system
@@ -102,6 +103,7 @@ class GearboxInTime:
         return torque_histories(list(given.items()), self.port_ratio)
 
 
+@former_keywords(found="state")
 def gearbox_in_time(
     state: Deflection, transient: TransientSection, *, steps: Steps | None = None, mean_damping: bool = True
 ) -> GearboxInTime:
@@ -176,6 +178,7 @@ class GearboxMotion:
     shafts: tuple[str, ...]
 
 
+@former_keywords(told="progress")
 def integrate(
     model: GearboxInTime, *, every: int = 1, lowpass: bool = True, progress=lambda share: None
 ) -> GearboxMotion:
