@@ -13,7 +13,7 @@ from typing import Any
 from nicegui import ui
 
 from femgear.app.document import entry_of
-from femgear.app.form import Entry, Table, sentence_of, shape_of, shown_value, table_of_schema, typed_value
+from femgear.app.form import Entry, Table, sentence_of, shape_of, shown_value, slider_of, table_of_schema, typed_value
 from femgear.errors import FemgearError
 from femgear.trains.reading import case_schema
 
@@ -121,7 +121,7 @@ class Form:
             if typed_value(entry, str(field.value or "")) != value:
                 self._fill(entry, field, value)
             if pin is not None:
-                pin.visible = value not in (None, "", [])
+                pin.visible = _draggable(value)
 
     @staticmethod
     def _fill(entry: Entry, field: Any, value: Any) -> None:
@@ -263,7 +263,7 @@ class Form:
             if entry.kind in ("quantity", "number", "list"):
                 pin = ui.button(icon="tune", on_click=lambda: self._pin(key))
                 pin.props(f'flat dense round size=sm tabindex=-1 aria-label="Slider of {words(entry.name)}"')
-                pin.visible = value not in (None, "", [])
+                pin.visible = _draggable(value)
             explained = ". ".join(text for text in (help_of(key), entry.hint) if text)
             if explained:
                 with field:
@@ -288,3 +288,8 @@ class Form:
         value = first.choices[0] if first.choices else 1 if first.kind in ("integer", "number") else _EMPTY
         self._open.add(key)
         self._change_rows(f"{key}[{number}].{first.name}", value)
+
+
+def _draggable(value: Any) -> bool:
+    """Whether a slider can be made of the value of an entry, or of one of its list."""
+    return any(slider_of("", part, None) is not None for part in (value if isinstance(value, list) else [value]))

@@ -110,7 +110,9 @@ def _read(kind: str, field: str, written: str) -> Any:
         raise CaseError(
             f"{written!r} is not read", code="E-TYPE", limit=limit, remedy=f"write it as in {examples[field]}"
         ) from error
-    return tuple(numbers) if field == "teeth" else numbers[0]
+    if field == "teeth":
+        return tuple(numbers)
+    return int(numbers[0]) if float(numbers[0]).is_integer() else numbers[0]
 
 
 def _draft(kind: str, given: Mapping[str, Any]) -> str:

@@ -56,11 +56,14 @@ class RunsPanel:
             self._progress = ui.linear_progress(value=0.0, show_value=False).classes("grow").props("instant-feedback")
             ui.button("Cancel", icon="cancel", on_click=self._runs.stop).props("flat dense no-caps")
         self._progress_row.visible = False
+        self._none_yet = ui.label("No run yet: the button Run computes everything, with pictures and a report.")
+        self._none_yet.classes("hint q-pa-md")
         self._report = ui.element("iframe").classes("report").props('title="Report"')
 
     def list_runs(self) -> None:
         """Offer the runs that the folder holds now."""
         runs = result_folders(self._session.folder)
+        self._none_yet.visible = not runs
         self._run.set_options(runs, value=self._run.value if self._run.value in runs else None)
         self._other.set_options(runs, value=[name for name in self._other.value or () if name in runs])
 

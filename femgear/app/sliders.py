@@ -62,9 +62,13 @@ class Sliders:
     def _usual(self, tables: Any) -> list[str]:
         """Keys of the entries of a case file that are dragged most."""
         keys = list(keys_of(form_of_model(tables.get("model")), tables, embedded=form_within))
-        listed = {key: row for key in keys if isinstance(row := entry_of(tables, key), list)}
-        keys += [f"{key}[{number}]" for key, row in listed.items() for number in range(len(row))]
-        return [key for key in usual_keys(keys) if self._slider(key, tables) is not None]
+        for key in list(keys):
+            value = entry_of(tables, key)
+            if isinstance(value, list):
+                keys += [f"{key}[{number}]" for number in range(len(value))]
+            elif isinstance(value, dict):  # as the torques of a load case, by their loads
+                keys += [f"{key}.{name}" for name in value if not {".", "[", "]"} & {*name}]
+        return usual_keys(key for key in keys if self._slider(key, tables) is not None)
 
     def _slider(self, key: str, tables: Any) -> Slider | None:
         """Slider of an entry of the tables of the case; in its former range, where that still reaches."""

@@ -104,6 +104,12 @@ def test_an_entry_that_is_taken_out_and_given_again_has_its_button_of_a_slider(f
     assert button.visible
 
 
+@pytest.mark.parametrize("typed", ("", "none", "a, b"))
+def test_what_is_no_number_has_no_button_of_a_slider(filled, typed):
+    filled.field("operation.torque").value = typed
+    assert not filled.button("Slider of torque").visible
+
+
 def test_a_row_is_added_where_the_file_has_one_more(filled):
     assert filled.field("sun.modifications[1].kind") is None
     filled.edit("sun.modifications[1].kind", "tip relief")

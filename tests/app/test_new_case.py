@@ -18,7 +18,7 @@ def test_every_kind_is_made_with_a_material_for_its_safeties(kind):
     text, problems = drafted_case(kind, {"teeth": " ".join(map(str, KINDS[kind])), "module": "2 mm", **STEEL})
     assert problems == {}
     check_case(parse_case(text))
-    assert text.count('treatment = "nitrided steel"') == text.count("hardness = 700") == text.count("youngs_modulus")
+    assert text.count('treatment = "nitrided steel"') == text.count("hardness = 700\n") == text.count("youngs_modulus")
 
 
 def test_numbers_are_those_that_were_typed():
@@ -49,6 +49,8 @@ def test_all_mistakes_are_told_at_once_in_words_of_the_window():
         ("stepped", {"treatment": "nitrided steel", "hardness": "1"}, "hardness"),
         ("pair", {"treatment": "nitrided steel", "hardness": ""}, "hardness"),
         ("pair", {"hardness": "hard"}, "hardness"),
+        ("pair", {"treatment": "nitrided steel", "hardness": "inf"}, "hardness"),
+        ("pair", {"treatment": "nitrided steel", "hardness": "nan"}, "hardness"),
         ("wolfrom", {"teeth": "18 27 72 27 72"}, "teeth"),
         ("gearbox", {"speed": "-1 m"}, "speed"),
     ),

@@ -83,6 +83,16 @@ def test_a_run_that_fails_says_why(panel, capsys):
     assert said == [("[E-SOLVE] no", "negative")] and capsys.readouterr().err == ""
 
 
+def test_a_folder_without_runs_says_what_makes_one(panel, tmp_path):
+    empty, _, _ = panel(Runs())
+    empty.list_runs()
+    assert empty._none_yet.visible
+    (tmp_path / "set_1").mkdir()
+    (tmp_path / "set_1" / "manifest.json").write_text("{}")
+    empty.list_runs()
+    assert not empty._none_yet.visible and empty._run.options == ["set_1"]
+
+
 def test_a_comparison_needs_two_runs(panel):
     runs = Runs()
     alone, said, _ = panel(runs)

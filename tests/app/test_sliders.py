@@ -72,6 +72,18 @@ def test_a_slider_follows_what_is_typed(dragged, key, typed, place):
     assert dragged.widgets() == before, "it is not drawn anew, so that it can be dragged on"
 
 
+def test_load_cases_of_a_gearbox_are_dragged(dragged):
+    from femgear.app.new_case import drafted_case
+
+    dragged.text = drafted_case("gearbox", {"torque": "20 N m", "speed": "900 rpm"})[0]
+    dragged.sliders.begin()
+    dragged.sliders.show(dragged.tables)
+    torque, speed = "operation.load_case[0].torque.motor", "operation.load_case[0].speed.input"
+    assert {key: slider.value for key, slider in dragged.widgets().items()} == {torque: 20.0, speed: 900.0}
+    dragged.widgets()[torque].value = 25.0
+    assert entry_of(dragged.tables, torque) == "25 N m" and dragged.changes == [torque]
+
+
 def test_a_slider_keeps_its_range_until_a_value_leaves_it(dragged):
     slider = dragged.widgets()["operation.torque"]
     dragged.type("operation.torque", "180 N m")

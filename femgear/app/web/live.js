@@ -15,11 +15,18 @@ live.begin = () => {
   document.querySelectorAll("#seen > figure").forEach((figure) => figure.classList.add("former"));
   live.at("cards").classList.add("former");
   live.at("state").textContent = "computing";
+  const start = performance.now();
+  clearInterval(live.clock);
+  live.clock = setInterval(() => {
+    live.at("elapsed").textContent = `${Math.round((performance.now() - start) / 1000)} s so far`;
+  }, 1000);
 };
 live.draft = ({ positions }) => {
   live.at("state").textContent = `draft while a slider moves: ${positions} positions, peaks between them are cut off`;
 };
 live.end = ({ seconds, text }) => {
+  clearInterval(live.clock);
+  live.at("elapsed").textContent = "";
   live.at("state").textContent = text || `computed in ${seconds.toFixed(2)} s`;
   if (!text) live.at("cards").classList.remove("former");
 };
@@ -103,7 +110,7 @@ live.space = ({ model }) => {
   view.render();
 };
 
-live.tables = ({ blocks }) => live.at("tables").replaceChildren(...blocks.flatMap(({ title, header, rows, notes }) => {
+live.table = ({ title, header, rows, notes }) => {
   const table = live.make("table"), caption = live.make("caption", "", title), body = live.make("tbody");
   const row = (cells, tag) => { const line = live.make("tr"); line.append(...cells.map((text) => live.make(tag, "", text))); return line; };
   table.append(caption);
@@ -114,7 +121,11 @@ live.tables = ({ blocks }) => live.at("tables").replaceChildren(...blocks.flatMa
   wide.tabIndex = 0;
   wide.append(table);
   return [wide, ...notes.map((text) => live.make("p", "note", text))];
-}));
+};
+live.tables = ({ blocks }) => {
+  live.at("numbers").hidden = !blocks.length;
+  live.at("tables").replaceChildren(...blocks.flatMap(live.table));
+};
 live.clear = () => {
   live.judge({ sentence: "", judgements: [] });
   live.keep({ names: [] });
