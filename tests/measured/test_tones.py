@@ -26,8 +26,7 @@ def channels(lines, tones, **options):
     return Channel("a", "acc", "m/s^2", RATE, signal), turns
 
 
-@pytest.mark.parametrize("amplitude", [100.0, 1.0, 0.1])
-@pytest.mark.parametrize("wander", [0.01, 0.05])
+@pytest.mark.parametrize(("amplitude", "wander"), [(100.0, 0.01), (0.1, 0.05)])
 def test_tones_are_found_with_their_frequencies_and_heights_and_leave_the_lines(amplitude, wander):
     tones = {50.0: amplitude, 150.03: 0.3 * amplitude}
     signal, found = without_tones(*channels(HEALTHY, tones, wander=wander))
@@ -41,8 +40,8 @@ def test_tones_are_found_with_their_frequencies_and_heights_and_leave_the_lines(
     assert order == pytest.approx(expected[:, 0], abs=0.01) and height == pytest.approx(expected[:, 1], rel=0.02)
 
 
-@pytest.mark.parametrize("drift", [0.005, 0.02])
-def test_hum_that_drifts_as_the_mains_do_is_taken_off_with_what_lies_beside_it(drift):
+def test_hum_that_drifts_as_the_mains_do_is_taken_off_with_what_lies_beside_it():
+    drift = 0.02
     signal, turns = channels(HEALTHY, {}, wander=0.01)
     time = signal.time
     hum = 100.0 * np.cos(2 * np.pi * (50.0 * time + drift * 17.0 / (2 * np.pi) * np.sin(2 * np.pi * time / 17.0)))
@@ -53,20 +52,19 @@ def test_hum_that_drifts_as_the_mains_do_is_taken_off_with_what_lies_beside_it(d
     assert order == pytest.approx(expected, abs=0.01)
 
 
-@pytest.mark.parametrize("wander", [0.0, 0.002, 0.01, 0.1])
+@pytest.mark.parametrize("wander", [0.0, 0.002, 0.1])
 def test_lines_of_turning_parts_are_no_tones(wander):
     """Nor are the many of a faulty planet tooth, a tenth of an order apart."""
     dense = HEALTHY | {108 + 2.7 * turn + q: 0.3 for turn in range(-6, 7) for q in (-2, -1, 0, 1, 2) if turn}
-    for lines in (HEALTHY, dense):
-        signal, turns = channels(lines, {}, wander=wander, seconds=40.0)
-        left, found = without_tones(signal, turns)
-        assert found == () and np.array_equal(left.values, resample_turns(signal, turns).values)
+    signal, turns = channels(dense, {}, wander=wander)
+    left, found = without_tones(signal, turns)
+    assert found == () and np.array_equal(left.values, resample_turns(signal, turns).values)
 
 
 def test_a_verdict_names_the_hum_and_is_that_without_it(tmp_path, recwarn):
     verdicts = []
     for amplitude in (0.0, 100.0):
-        signal, pulses, _ = recording(HEALTHY, HEALTHY.values(), wander=0.01)
+        signal, pulses, _ = recording(HEALTHY, HEALTHY.values(), wander=0.01, seconds=10.0)
         time = np.arange(len(signal)) / RATE
         columns = time, signal + amplitude * np.cos(2 * np.pi * 50.0 * time), pulses
         path = write_columns(tmp_path / "a.csv", "time [s];acc [m/s^2];tacho [V]\n", columns, comma=True)
