@@ -142,6 +142,8 @@ NORMAL, UNEQUAL, FOREIGN = "normal", "needs unequal turning parts", "not from th
 MOST_TURNS = 2
 """Turns of a part in a line, unless it is heard: a planet that hits sun and ring meets one of them twice a turn."""
 _NO_TURNS = ", nor at one or two turns of sun or planet"
+_CLEARLY_NEARER = 0.3
+"""Distance between places of turns over the tolerance from which on the nearer one counts, else the fewer turns."""
 _ZERO = 5e-4
 """Array factor that angles given to a thousandth of a degree may leave where there is none."""
 
@@ -184,7 +186,8 @@ def classify_lines(
     """Classify all lines (k,) of a record as `classify_line`; of a part that is heard at more of its turns too.
 
     A tooth that hits once a turn makes lines at all turns of its gear. They are counted where lines at one or two of
-    them stand in the record: else the many turns would explain almost any line.
+    them stand in the record: else the many turns would explain almost any line. Where several parts are heard, a line
+    at turns of one is compared with all turns of the others, which may lie nearer.
     """
     first = [classify_line(order, planet_angles, teeth, tolerance=tolerance) for order in orders]
     heard_parts = frozenset(place.part for place in first if place.part)
@@ -192,7 +195,7 @@ def classify_lines(
         return tuple(first)
     return tuple(
         classify_line(order, planet_angles, teeth, tolerance=tolerance, heard_parts=heard_parts)
-        if place.verdict == FOREIGN
+        if place.verdict == FOREIGN or place.part
         else place
         for order, place in zip(orders, first, strict=True)
     )
@@ -239,10 +242,11 @@ def classify_line(
     if whole and nearest % g == 0:
         shared = "factor zero: by sun and ring, which unequally spaced planets share"
         return LineVerdict(nearest, factor, NORMAL, "" if factor > _ZERO else shared)
-    turns = [turn for turn in _turns(order, teeth, g, tolerance) if not (whole and turn[1])]
-    if heard_parts and not whole and not turns:
+    turns = [turn for turn in _turns(order, teeth, g, tolerance) if not (whole and turn[2])]
+    if heard_parts and not whole and (not turns or len(heard_parts) > 1):
         turns = list(_turns(order, teeth, g, tolerance, heard_parts))
-    *_, turned, part = min(turns, key=lambda turn: turn[0] + turn[1]) if turns else ("", "")
+    nearest_turns = sorted(turns, key=lambda turn: (round(turn[0] / (_CLEARLY_NEARER * tolerance)), turn[1] + turn[2]))
+    *_, turned, part = nearest_turns[0] if turns else ("", "")
     if whole:
         words = f"no multiple of {g}" + (f"; {turned}" if turned else "")
         return LineVerdict(nearest, factor, UNEQUAL, words)
@@ -253,8 +257,11 @@ def classify_line(
 
 def _turns(
     order: float, teeth, symmetry: int, tolerance: float, heard_parts: Collection[str] = ()
-) -> Iterator[tuple[int, int, str, str]]:
-    """Turns of sun and planet that give an order: how many, carrier orders beside a mesh harmonic, words, part."""
+) -> Iterator[tuple[float, int, int, str, str]]:
+    """Turns of sun and planet that give an order.
+
+    How far it is from theirs, how many turns, carrier orders beside a mesh harmonic, words, part.
+    """
     ring, sun, planet = teeth
     parts = (("the sun", sun and sun_ratio(sun, ring), symmetry), ("a planet", planet and ring / planet, 1))
     for name, rate, step in parts:
@@ -269,7 +276,7 @@ def _turns(
                 n, beside = abs(k), whole - harmonic
                 words = f"{harmonic} {'+' if k > 0 else '-'} {n} turn{'s' * (n > 1)} of {name}"
                 words += f" {'+' if beside > 0 else '-'} {abs(beside)}" if beside else ""
-                yield n, abs(beside), words, part
+                yield abs(rest - whole), n, abs(beside), words, part
 
 
 def counted_turns(part: str, teeth, symmetry: int, tolerance: float) -> int:

@@ -9,6 +9,7 @@ from __future__ import annotations
 import csv
 import os
 import re
+from collections import Counter
 from itertools import product
 from pathlib import Path
 
@@ -33,6 +34,8 @@ _MOSTLY = 0.9
 """Share of high bytes that are zero in UTF-16 of numbers."""
 _LOOKED_AT = 50
 """Lines by which separator and decimal mark are found."""
+_NEARLY_ALL = 0.9
+"""Share of these lines that have one form where the others are broken."""
 _SEPARATORS = (";", "\t", ",", None)
 _NUMBER = {".": r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", ",": r"[+-]?(\d+,?\d*|,\d+)([eE][+-]?\d+)?"}
 _DIGITS, _COMMAS_ALONE = re.compile(r"[+-]?\d+"), re.compile(r"[\d+\-eE]+(,[\d+\-eE]+){2,}")
@@ -134,6 +137,7 @@ def _form(lines: list[str], first: int, name: str) -> tuple[str | None, str]:
     if not counts and all(_COMMAS_ALONE.fullmatch(line.strip()) for line in sample):
         raise _commas_within_commas(sample[0], first, name)
     if not counts:
+        _refuse_single_lines(lines, first, name)
         remedy = "one separator in all lines, and decimal points or decimal commas throughout"
         raise file_problem(
             f"{name}:{first + 1}", "the columns cannot be told apart", value=sample[0][:80], remedy=remedy
@@ -143,6 +147,31 @@ def _form(lines: list[str], first: int, name: str) -> tuple[str | None, str]:
     if best == (",", ".") and any(separator is None for separator, _ in counts):
         return _comma_between_or_within(lines, first, most, name)
     return best
+
+
+def _refuse_single_lines(lines: list[str], first: int, name: str) -> None:
+    """Refuse the first line of samples that does not have the form of nearly all others, if there is such a form."""
+    sample = enumerate(lines[first : first + _LOOKED_AT], first + 1)
+    numbered = [(place, line) for place, line in sample if line.strip()]
+    for separator, mark in product(_SEPARATORS, ".,"):
+        number = re.compile(_NUMBER[mark])
+        rows = [_cells(line, separator) for _, line in numbered]
+        columns = Counter(map(len, rows)).most_common(1)[0][0]
+        fits = [len(row) == columns and all(map(number.fullmatch, row)) for row in rows]
+        if separator != mark and columns > 1 and _NEARLY_ALL * len(fits) <= sum(fits) < len(fits):
+            place, line = numbered[fits.index(False)]
+            raise _broken_line(f"{name}:{place}", line, columns)
+
+
+def _broken_line(place: str, line: str, columns: int) -> CaseError:
+    """Make the refusal of a line that is not made of so many numbers."""
+    return file_problem(
+        place,
+        "a line that is not made of finite numbers, one for every column",
+        value=line[:80],
+        limit=f"{columns} numbers",
+        remedy="cut the file there if it was broken off; lost samples are not replaced",
+    )
 
 
 def _check_decimal_points(lines: list[str], first: int, name: str) -> None:
@@ -191,13 +220,7 @@ def _numbers(lines: list[str], first: int, separator: str | None, mark: str, nam
     for place, line in enumerate(lines[first:], first + 1):
         cells = _cells(line, separator)
         if line.strip() and (len(cells) != columns or not all(map(number.fullmatch, cells))):
-            raise file_problem(
-                f"{name}:{place}",
-                "a line that is not made of finite numbers, one for every column",
-                value=line[:80],
-                limit=f"{columns} numbers",
-                remedy="cut the file there if it was broken off; lost samples are not replaced",
-            )
+            raise _broken_line(f"{name}:{place}", line, columns)
     raise file_problem(name, "numbers that cannot be read", remedy="write them as 1.5 or 2.4e3")
 
 

@@ -54,6 +54,10 @@ _SHOWN = 40
 _LINES, _SPECTRUM, _FIGURE = "lines.csv", "order_spectrum.csv", "lines.png"
 _DEEPER = (0.0, -20.0, -40.0, -60.0, -80.0)
 """Levels by which lines from elsewhere may be stronger than all of the set [dB]."""
+_FEW = 3
+"""Lines from which on a set without a normal one is doubted."""
+_MAINS = (50.0, 60.0)
+"""Frequencies of the mains [Hz]."""
 _HALF_WIDTH = 12
 _HARMONICS = 3
 
@@ -98,7 +102,9 @@ def measured_verdict(
     # a line from elsewhere counts no more than the strongest of the set
     order, height = np.array([(line.order, 10.0 ** (min(line.level, 0.0) / 20.0)) for line in lines]).reshape(-1, 2).T
     highest = float(spectrum.order[-1])
-    _tell_wrong_turns(lines_near_mesh(gear_set, order, height, tolerance, highest), recording, highest)
+    healthy = len(lines) < _FEW or any(line.verdict == VERDICTS[0] for line in lines)
+    mesh = lines_near_mesh(gear_set, order, height, tolerance, highest)
+    _tell_wrong_turns(mesh, recording, highest, healthy=healthy)
     return MeasuredVerdict(gear_set, signal, spectrum, lines, tolerance)
 
 
@@ -120,11 +126,16 @@ def _judged_lines(
     return judged[0]
 
 
-def _tell_wrong_turns(mesh: MeshLines, recording: Recording, highest: float) -> None:
-    """Say where lines do not lie at places of the set, and which factor of the speed would bring them there."""
-    if mesh.fits and mesh.factor == 1.0:
+def _tell_wrong_turns(mesh: MeshLines, recording: Recording, highest: float, *, healthy: bool) -> None:
+    """Say where lines do not lie at places of the set, and which factor of the speed would bring them there.
+
+    ``healthy`` is whether any lies where a healthy set has one, or there are few lines.
+    """
+    if mesh.fits and mesh.factor == 1.0 and healthy:
         return
     words = f"lines up to order {highest:.4g} lie as they would without this set"
+    if mesh.fits and not healthy:
+        words = "no line lies where a healthy set has lines, and those of a faulty one are among them"
     if mesh.factor != 1.0:
         words = f"lines lie far better at orders of the set if the carrier made {mesh.factor:.4g} times as many turns: "
         words += f"{mesh.share_then:.0%} of them near mesh harmonics, not {mesh.share:.0%}"
@@ -216,6 +227,7 @@ def _notes(verdict: MeasuredVerdict) -> Iterator[str]:
     above = max((line.level for line in verdict.lines), default=0.0)
     if above > 0.0:
         yield f"levels are over the strongest line that the set can make; one from elsewhere is {above:.1f} dB above it"
+    yield from _hum_notes(verdict)
     counts = {word: [line for line in verdict.lines if line.verdict == word] for word in VERDICTS}
     yield ", ".join(f"{len(lines)} {word}" for word, lines in counts.items() if lines) or "no line stands out"
     for word, lines in list(counts.items())[1:]:
@@ -227,6 +239,20 @@ def _notes(verdict: MeasuredVerdict) -> Iterator[str]:
     gear_set = verdict.gear_set
     likely = chance(verdict.tolerance, gear_set.teeth, spacing_symmetry(gear_set.angles), heard_parts)
     yield f"an order without meaning fits turns of sun or planet by chance in {likely:.0%} of cases at most"
+
+
+def _hum_notes(verdict: MeasuredVerdict) -> Iterator[str]:
+    """Say that the strongest line that is not normal lies at a frequency of the mains."""
+    suspects = [line for line in verdict.lines if line.verdict != VERDICTS[0]]
+    if not suspects:
+        return
+    line = max(suspects, key=lambda line: line.level)
+    hertz = line.order * verdict.signal.speed
+    for mains in _MAINS:
+        multiple = round(hertz / mains)
+        off = abs(hertz - multiple * mains)
+        if multiple in (1, 2) and off <= max(0.5 * verdict.signal.speed / verdict.signal.turns, 1e-3 * hertz):
+            yield f"the line at order {line.order:.2f} is at {hertz:.2f} Hz, where hum of the mains would be"
 
 
 def _words_on_place(line: MeasuredLine) -> tuple[object, ...]:

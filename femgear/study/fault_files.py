@@ -72,6 +72,7 @@ def fault_records_into(
         left = [machine for machine in longest_first(times) if not _is_there(plan, folder / _name(machine))]
         what, done = f"{len(machines)} machines, share of the work [%]", sum(times.values()) - sum(map(times.get, left))
         outcomes = (runner or Runner()).map(partial(solve_machine, plan), left)
+        progress(what, round(100.0 * done / sum(times.values())), 100.0)
         for index, outcome in outcomes:
             if isinstance(outcome, FemgearError):
                 raise outcome

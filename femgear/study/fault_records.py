@@ -159,11 +159,15 @@ def fault_plan(
     if not torque:
         message, remedy = "without torque no tooth carries load", 'give a torque, as in operation.torque = "100 N m"'
         raise CaseError(message, code="E-NO-LOAD", key="operation.torque", value=torque, remedy=remedy)
-    up_to = request.up_to or ("5 kHz" if case.dynamics.up_to is None else f"{case.dynamics.up_to:.9g} Hz")
-    to_si(up_to, FREQUENCY, low=10.0)
-    common = {"dynamics.up_to": up_to, "static.stresses": False, "housing.published": None, "housing.measured": None}
-    case = with_values(case, common)
     kinds, places = chosen_words(request.kinds, KINDS, "--kinds"), chosen_words(request.gears, GEARS, "--gears")
+    common = {"static.stresses": False, "housing.published": None, "housing.measured": None}
+    if request.up_to is not None:
+        to_si(request.up_to, FREQUENCY, low=10.0)
+        common |= dict.fromkeys(("dynamics.mesh_harmonics", "dynamics.response_harmonics"))
+        common["dynamics.up_to"] = request.up_to
+    elif case.dynamics.up_to is None and case.dynamics.mesh_harmonics is None:
+        common["dynamics.up_to"] = "5 kHz"
+    case = with_values(case, common)
     sizes = size_ranges(request.sizes, gears.sun.module)
     _check_largest(case, kinds, places, sizes)
     steps = Steps()

@@ -243,6 +243,19 @@ def test_a_part_that_is_heard_has_lines_at_all_its_turns():
     assert counted_turns("planet", (95, 31, 31), 3, 0.005) == 15
 
 
+def test_lines_of_two_parts_that_nearly_meet_are_those_of_the_nearer():
+    """22/20/62: places of the sun are elevenths of an order, those of a planet tenths."""
+    angles, teeth = (
+        np.radians([0.0, 120.0, 240.0 + 360.0 / 84.0 * 0.0]) + np.radians([0.0, 360.0 / 84.0, 0.0]),
+        (62, 22, 20),
+    )
+    of_sun = 62 + 42 / 11 * np.arange(1, 11)
+    places = classify_lines(of_sun, angles, teeth, tolerance=0.02)
+    assert {place.part for place in places} == {"sun"}
+    both = classify_lines([*of_sun, *(62 + 3.1 * np.array([1, 2, 4, 7]))], angles, teeth, tolerance=0.02)
+    assert [place.part for place in both] == ["sun"] * 10 + ["planet"] * 4
+
+
 def test_whole_turns_of_the_sun_are_named_where_they_stand_beside_a_mesh_harmonic():
     """27/108: a turn of the sun is five of the carrier."""
     angles = np.radians([0.0, 120.0, 240.0])

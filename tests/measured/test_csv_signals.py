@@ -65,6 +65,7 @@ def broken(text):
 
 
 ROWS = "".join(f"{t:.4f};{x:.6f}\n" for t, x in zip(TIME, VALUES[0]))
+HALF_WITH_COMMAS = [line.replace(".", ",") if k % 2 else line for k, line in enumerate(ROWS.splitlines(True))]
 
 
 @pytest.mark.parametrize(
@@ -76,7 +77,9 @@ ROWS = "".join(f"{t:.4f};{x:.6f}\n" for t, x in zip(TIME, VALUES[0]))
         ("t;a\n" + ROWS + "0.3;x\n", "a.csv:302"),
         ("t;a\n" + ROWS + "0.3;\n", "a.csv:302"),
         ("t;a\n" + ROWS.replace("0.1000;", "0,1000;"), "a.csv:102"),
-        ("t;a\n" + ROWS.replace("0.0100;", "0,0100;"), "cannot be told apart"),
+        ("t;a\n" + ROWS.replace("0.0100;", "0,0100;"), "a.csv:12: a line that is not made"),
+        ("t;a\n" + ROWS.replace("0.0100;", ";"), "a.csv:12: a line that is not made"),
+        ("t;a\n" + "".join(HALF_WITH_COMMAS), "cannot be told apart"),
         ("".join(f"{abs(x):.3f}\n".replace(".", ",") for x in VALUES[0]), "may be separators or decimal marks"),
         ("t;a\n" + "\n".join(ROWS.splitlines()[:20]), "20 samples"),
         ("a;b\n" + "".join(f"{x};{y}\n" for x, y in VALUES.T), "how many samples a second"),

@@ -8,11 +8,11 @@ from recorded_signals import CASE, HEALTHY, RATE, recording, write_columns
 
 from femgear.measured.channels import Channel
 from femgear.measured.lines import VERDICTS, sharpened_lines
-from femgear.measured.requests import Recording
+from femgear.measured.requests import LineSearch, Recording
 from femgear.measured.spectra import windowed_spectrum
 from femgear.measured.tones import without_tones
 from femgear.measured.turns import resample_turns, turns_of_pulses
-from femgear.measured.verdict import measured_verdict
+from femgear.measured.verdict import describe_verdict, measured_verdict
 from femgear.trains.reading import read_case
 
 
@@ -84,7 +84,19 @@ def test_at_a_constant_speed_hum_is_a_line_from_elsewhere_that_hides_none(tmp_pa
     path = write_columns(tmp_path / "a.csv", "time [s];acc [m/s^2];tacho [V]\n", columns, comma=True)
     verdict = measured_verdict(read_case(CASE), path, Recording(pulses="tacho"))
     assert not [warning for warning in recwarn if "W-UNSTEADY" in str(warning.message)]
+    assert not any("mains" in note for block in describe_verdict(verdict, LineSearch()) for note in block.notes)
     foreign = [line for line in verdict.lines if line.verdict == VERDICTS[-1]]
     assert [round(line.level) for line in foreign] == [40]
     normal = [round(line.order) for line in verdict.lines if line.verdict == VERDICTS[0]]
     assert normal == [at for at, value in HEALTHY.items() if abs(value) > 10 ** (-30 / 20)]
+
+
+def test_a_line_where_hum_of_the_mains_would_be_is_named(tmp_path):
+    """At a constant speed it may be a line from elsewhere, or fit turns of a part by chance."""
+    lines = HEALTHY | {100.0 / 3.0: 10.0}
+    signal, pulses, _ = recording(lines, lines.values(), wander=0.0, noise=1e-6)
+    columns = np.arange(len(signal)) / RATE, signal, pulses
+    path = write_columns(tmp_path / "a.csv", "time [s];acc [m/s^2];tacho [V]\n", columns)
+    verdict = measured_verdict(read_case(CASE), path, Recording(pulses="tacho"))
+    notes = [note for block in describe_verdict(verdict, LineSearch()) for note in block.notes]
+    assert "the line at order 33.33 is at 100.00 Hz, where hum of the mains would be" in notes

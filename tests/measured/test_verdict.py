@@ -77,6 +77,17 @@ def test_pulses_that_are_counted_as_half_of_them_are_told_with_the_factor(tmp_pa
     )
 
 
+def test_lines_that_fit_a_fault_alone_are_doubted(tmp_path, recwarn):
+    """The gears of another set may have lines at turns of the sun; a faulty set has those of a healthy one too."""
+    lines = {5 * turn + 1: 1.0 for turn in (19, 23, 29, 37, 41, 43, 52)}
+    for more, doubted in (({}, True), ({324: 0.5}, False)):
+        order = np.array([at for at in lines | more if at % 3 or at in more])
+        recwarn.clear()
+        measured_verdict(read_case(CASE), written(tmp_path, order, np.ones(len(order))), Recording(pulses="tacho"))
+        texts = [str(warning.message) for warning in recwarn if "W-UNSTEADY" in str(warning.message)]
+        assert any("no line lies where a healthy set has lines" in text for text in texts) == doubted
+
+
 def test_silence_has_no_lines(tmp_path):
     verdict = measured_verdict(read_case(CASE), written(tmp_path, [3], [1e-6], noise=1e6), Recording(pulses="tacho"))
     assert verdict.lines == ()

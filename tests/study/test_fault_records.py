@@ -1,5 +1,6 @@
 """Records of drawn machines: the same alone, those of a run of their case, and what is refused."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -122,6 +123,15 @@ def test_noise_may_be_none(case):
     plan = fault_plan(case, FaultRequest(kinds=("healthy",), noise="none", **SHORT), cache=grid_cache())
     assert plan.noise == 0.0
     assert plan.model is None
+
+
+def test_the_end_of_the_forces_is_that_of_the_case_unless_another_one_is_given(case):
+    of_case = with_values(case, {"dynamics.up_to": None, "dynamics.mesh_harmonics": 5})
+    request = FaultRequest(kinds=("healthy",), **SHORT)
+    dynamics = fault_plan(of_case, request, cache=grid_cache()).case.dynamics
+    assert (dynamics.mesh_harmonics, dynamics.up_to) == (5, None)
+    dynamics = fault_plan(of_case, replace(request, up_to="2 kHz"), cache=grid_cache()).case.dynamics
+    assert (dynamics.mesh_harmonics, dynamics.up_to) == (None, 2000.0)
 
 
 @pytest.mark.parametrize(

@@ -254,7 +254,10 @@ def _refuse_open(opened: np.ndarray) -> None:
             "model cannot represent loss of contact",
             code="E-CONTACT-OPEN",
             key="operation.torque",
-            remedy="raise operation.torque or reduce the errors",
+            remedy=(
+                "raise operation.torque, reduce the errors, or leave out teeth that are missing or broken",
+                "femgear run --only static computes what comes before",
+            ),
         )
 
 
