@@ -74,6 +74,35 @@ def test_public_functions_of_arrays_tell_a_shape():
     assert without == []
 
 
+ARRAY = re.compile(r"(?:np\.ndarray|NDArray(?:\[.*\])?|Vector)(?: \| None)?")
+"""Annotation of an array alone, not of a tuple or mapping of some."""
+SHARED = re.compile(r"(?m)^((?:\w+, )*\w+)(?: : |\n    )(?=.*(?:\(|[Aa]s |see))")
+"""Names of parameters that have one entry, and with it one shape."""
+
+
+def test_public_functions_tell_as_many_shapes_as_they_have_arrays():
+    """Of parameters and what is returned; a reference to another docstring counts as a shape."""
+    count, without = 0, []
+    for path in sorted(PACKAGE.rglob("*.py")):
+        for name, node in public_functions(path):
+            arguments = [*node.args.posonlyargs, *node.args.args, *node.args.kwonlyargs]
+            kinds = [one.annotation for one in arguments if one.annotation is not None]
+            kinds += [node.returns] if node.returns is not None else []
+            arrays = sum(bool(ARRAY.fullmatch(ast.unparse(kind))) for kind in kinds)
+            docstring = ast.get_docstring(node)
+            if docstring is None or not arrays or "All arrays are (" in docstring:
+                continue
+            count += 1
+            shapes = re.findall(
+                r"\((?:\.\.\.|[^()]*,[^()]*|\d+)\)|\((?=\d+ \()|shape|\b[Aa]s (?:of |those of )?`|see `", docstring
+            )
+            shared = sum(names.count(",") for names in SHARED.findall(docstring))
+            if len(shapes) + shared < arrays:
+                without.append(f"{path.relative_to(PACKAGE)}: {name}")
+    assert count > 700  # the walk found them
+    assert without == []
+
+
 def words_on(name: str, docstring: str) -> str:
     """Entry of a name in a docstring, and the sentences that hold it between backticks."""
     entries = re.findall(r"(?m)^((?:\w+, )*\w+)(?: : |\n(?=    ))(.*(?:\n    .*)*)", docstring)

@@ -41,6 +41,11 @@ def friction_coefficient(
         [Hz]
     base_helix : float
         [rad]
+
+    Returns
+    -------
+    (m,) array
+        [1]
     """
     losses, line_load = case.losses, np.abs(force) / pair.face_width
     if losses.friction == "constant":
@@ -70,6 +75,11 @@ def law_friction(case: Any, name: str, pair: GearPair, line_load: np.ndarray, at
         Force at the base circle over face width [N/m]; ISO/TS 6336-20 has that at the pitch circle.
     at_pitch : PathSpeeds
         At the pitch point.
+
+    Returns
+    -------
+    (...) array
+        [1]
     """
     oil: LubricantSection = case.lubricant
     load = line_load * math.cos(pair.working_pressure_angle) if name == "iso" else line_load

@@ -537,7 +537,10 @@ def _without_half_plane(gear, material, stations, depths, compliance, nodes, wid
 
 
 def regular_compliance(compliance: np.ndarray, local: np.ndarray) -> np.ndarray:
-    """Compliance (teeth, 2n, 2n) [m/N] without the local part (2, n, n) [m/N] on each flank, made reciprocal."""
+    """Take the local part (2, n, n) [m/N] on each flank out of a compliance (teeth, 2n, 2n) [m/N].
+
+    The rest (teeth, 2n, 2n) is made reciprocal.
+    """
     regular, n = compliance.copy(), local.shape[-1]
     for side in (LEFT, RIGHT):
         block = slice(side * n, (side + 1) * n)

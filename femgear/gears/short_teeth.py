@@ -58,7 +58,7 @@ def renumbered(teeth: Iterable[tuple[int, _Said]], first: int, count: int) -> tu
 def without_tips(points: np.ndarray, short: Sequence[tuple[int, float]], count: int, *, internal: bool) -> np.ndarray:
     """Pull points (n, 2) of a whole gear, tooth 0 on the x axis, to the radii that its short teeth reach [m].
 
-    Sectors have the angle of a pitch; ``count`` is the number of teeth.
+    Returns the points (n, 2). Sectors have the angle of a pitch; ``count`` is the number of teeth.
     """
     moved = np.array(points, float)
     sector = np.rint(np.arctan2(moved[:, 1], moved[:, 0]) * count / (2.0 * np.pi)).astype(int) % count

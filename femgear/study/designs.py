@@ -554,7 +554,7 @@ class Evaluations:
         deque(self.designs.ahead(new[:room], quantities, self.problem.limits), 0)
 
     def count(self, x: Vector) -> bool:
-        """Note that a point is asked for, and say whether it is new; may raise `Enough`."""
+        """Note that a point x (n,) is asked for, and say whether it is new; may raise `Enough`."""
         point = self.problem.point(x)
         new = point not in self._requested
         if self._most is not None and new and self.requested >= self._most:
@@ -563,7 +563,7 @@ class Evaluations:
         return new
 
     def penalised(self, x: Vector, value) -> float:
-        """Compute ``value()`` of a design within the limits; elsewhere it has the costs that `cost` names."""
+        """Compute ``value()`` of a design x (n,) within the limits; elsewhere it has the costs that `cost` names."""
         try:
             outside = self.violation(x)
             return min(OUTSIDE + outside, 0.5 * _REFUSED) if outside else value()
@@ -571,7 +571,10 @@ class Evaluations:
             return _REFUSED
 
     def violation(self, x: Vector) -> float:
-        """Sum the relative violations of limits of the first stage that breaks any. May raise `Failure`."""
+        """Sum the relative violations of limits of the first stage that breaks any, at a point x (n,).
+
+        May raise `Failure`.
+        """
         return _violation(self.problem.limits, lambda quantities: self.values(x, quantities))
 
     def scale(self, quantity: StudyQuantity) -> float:

@@ -359,7 +359,10 @@ def _optimum(run: Evaluations, before: dict, sensitivity: bool, telling: bool, e
 
 
 def start_at(problem: Problem, start: Vector | None) -> np.ndarray:
-    """Check a start (n,), by default the values of the case; E-START (CaseError) outside the bounds."""
+    """Check a start (n,), by default the values of the case, and give it as x (n,).
+
+    E-START (CaseError) outside the bounds.
+    """
     if start is None:
         return start_point(problem.case, problem.variables)
     x, (low, high) = np.asarray(start, float), problem.bounds.T

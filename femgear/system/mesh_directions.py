@@ -261,7 +261,8 @@ def _pin(data: RigidSet, planet: int, stiffness, directions: np.ndarray) -> Stat
 def station_motions(data: RigidSet) -> np.ndarray:
     """Compute the motions (6 (N + 3), n) of all stations [m, rad] per unit of the coordinates of a set.
 
-    Arcs ``w`` and ``u`` are on the radius of the body.
+    Each of the n columns has the motions x, y, z and rotations of every station, (N + 3, 6). Arcs ``w`` and ``u``
+    are on the radius of the body.
     """
     scale = np.ones((data.n_planets + 3, 6))
     scale[:, 3:] = 1.0 / data.radii[:, None]

@@ -135,7 +135,10 @@ class Frame:
         return float(np.sqrt(np.abs(self.square).max(initial=0.0)))
 
     def kappa(self, tangent: np.ndarray) -> np.ndarray:
-        """Compute the change of stiffness of tangents, both (..., n_c, n_c) [N/m], the modes left out in series."""
+        """Compute the change (..., n_c, n_c) [N/m] of stiffness of tangents (..., n_c, n_c) [N/m].
+
+        The modes left out are in series.
+        """
         change = tangent - np.diag(self.reference)
         return stiffness_in_series(change, self.residual) if np.any(self.residual) else change
 

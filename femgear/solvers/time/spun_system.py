@@ -179,7 +179,10 @@ class SpunSystem:
         return total
 
     def touching(self, approach: np.ndarray, gap: np.ndarray) -> np.ndarray:
-        """Tell of meshes (..., M) whether one of their flanks touches, from ``approach`` and ``gap`` (..., c) [m]."""
+        """Tell of meshes (..., M) whether one of their flanks touches.
+
+        From ``approach`` (..., c) and ``gap`` (..., c) [m].
+        """
         overlap = approach - gap >= 0.0
         touched = overlap[..., self.drives].copy()
         behind = np.flatnonzero(self.side == BACK)

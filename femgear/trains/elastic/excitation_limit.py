@@ -121,9 +121,9 @@ def excitation_end(
 ) -> tuple[float, float, np.ndarray]:
     """Choose where the excitation ends, from some speeds, so that the level has converged if it may.
 
-    Frequency [Hz], that to which the level was compared [Hz], and its changes at the speeds [dB], nan where
-    the equations with more excitation are nearly singular; mesh frequencies [Hz] and speeds of the carrier
-    [rad/s] are (n_speeds,). ``level`` (n_speeds,) is that with `first_limit` where it is known.
+    Frequency [Hz], that to which the level was compared [Hz], and its changes (n_speeds,) at the speeds [dB], nan where
+    the equations with more excitation are nearly singular. ``frequency`` (n_speeds,) is that of the meshes [Hz],
+    ``carrier`` (n_speeds,) the speed of the carrier [rad/s], ``level`` (n_speeds,) that with `first_limit`.
     """
     given, up_to = case.dynamics.mesh_harmonics, case.dynamics.up_to or modes.reach
     limit = first_limit(case, modes, frequency)

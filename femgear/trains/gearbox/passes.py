@@ -85,7 +85,7 @@ def _lengths(model: GearboxModel, positions: MeshPositions) -> np.ndarray:
 
 
 def slopes_agree(model: GearboxModel, new: np.ndarray, old: np.ndarray, tolerance: float, least: float) -> bool:
-    """Whether slopes ``new`` and ``old`` (M,) [rad] agree.
+    """Tell whether slopes ``new`` (M,) and ``old`` (M,) [rad] agree.
 
     Their difference over the width counts against the misalignment, or the ``least`` one [m] where that is more.
     """

@@ -406,8 +406,8 @@ def rubbing_rows(state: Deflection, stage: StageModel) -> tuple[list[Row], np.nd
 def equal_planets(assembly: Assembly, meshes: Sequence[int], planets: int, stiffness: np.ndarray) -> np.ndarray:
     """Give every slice of meshes, kind by kind, the mean of the planets, one after the other stands there.
 
-    ``stiffness`` (g,) [N/m] is that of all slices, before and after. Where planets stand, some slices may carry
-    nothing, as weight and bending shafts have it.
+    ``stiffness`` (g,) [N/m] is that of all slices; its means (g,) are returned. Where planets stand, some slices may
+    carry nothing, as weight and bending shafts have it.
     """
     averaged = stiffness.copy()
     for alike in np.reshape(meshes, (-1, planets)):
@@ -478,7 +478,10 @@ def row_waves(row: Row, orbit: Orbit | None, station: int, places: np.ndarray) -
 
 
 def shape_waves(row: Row, orbit: Orbit | None, motion: np.ndarray, places: np.ndarray) -> np.ndarray:
-    """Approach (W, m) of a contact point by modes whose motions (6n, m) are given, as the planet runs around."""
+    """Compute waves (W, m) of the approach of a contact point by modes with motions (6n, m), as the planet runs around.
+
+    ``places`` (n, 3) are those of all stations [m], waves as of `row_waves`.
+    """
     shape = np.zeros((1 if orbit is None else 3, motion.shape[1]), complex)
     for station in {station for station, _ in row}:
         shape += row_waves(row, orbit, station, places) @ motion[6 * station : 6 * station + 6]

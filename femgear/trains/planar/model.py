@@ -517,7 +517,7 @@ def shown_points(rms: np.ndarray, back: np.ndarray, stable: np.ndarray) -> list[
 def merged_folds(frequency: np.ndarray, fold: np.ndarray) -> np.ndarray:
     """Find the limit points of a branch, neighbours at one frequency as one: the outermost of them.
 
-    From the frequencies (p,) along the branch, and whether each point is a fold (p,).
+    From the frequencies (p,) along the branch, and whether each point is a fold (p,): numbers (f,) of points.
     """
     groups: list[list[int]] = []
     for point in np.flatnonzero(fold):
