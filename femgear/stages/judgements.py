@@ -36,6 +36,8 @@ FAULTY, STRONG, LIFE, HEAT, SMOOTH, QUIET, SURE = (
 
 _RAISED = 0.5
 """Change of a level by a longer excitation from which on the higher one is compared with the limit too [dB]."""
+MOST_FAULTS = 3
+"""Faults that page one names."""
 MOST_DOUBTS = 4
 """Doubts that the card of the numbers names."""
 _AGAINST = {"S_F": "against breakage", "S_H": "against pitting"}
@@ -174,6 +176,13 @@ def unrated_gears(rating: Rating) -> list[str]:
     return [
         gear if len(lacking) == 2 else f"{next(iter(lacking))} of {gear}" for gear, lacking in gears.items() if lacking
     ]
+
+
+def judge_faults(faults: Sequence[str], effects: str) -> Judgement:
+    """Name faulty teeth, the first of many, and say what that does."""
+    answer = ", ".join(faults[:MOST_FAULTS])
+    answer += f" and {len(faults) - MOST_FAULTS} more" if len(faults) > MOST_FAULTS else ""
+    return Judgement(FAULTY, "look", answer, effects, f"Faulty: {answer}")
 
 
 def _not_rated(parts: Sequence[str]) -> str:

@@ -181,7 +181,7 @@ def describe_faults(case: Any, mesh_frequency: float | None) -> Iterator[Block]:
 def fault_words(case: Any) -> list[str]:
     """Name the faults of a case by gear, tooth, kind and size: ``"planet 1, tooth 3: crack of 1.5 mm"``."""
     gears = planetary_set(case)
-    names = {(body.gear, body.copy): body.name for body in gears.bodies}
+    names = {(body.gear, body.copy): body.name.replace("_", " ") for body in gears.bodies}
     return [
         f"{names[fault.gear, fault.copy]}, "
         f"{'all teeth' if fault.tooth is None else f'tooth {fault.tooth}'}: {_size_words(_section(case, key))}"

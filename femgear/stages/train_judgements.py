@@ -10,11 +10,11 @@ import numpy as np
 
 from femgear.case.load_spectrum import required_life
 from femgear.stages.judgements import (
-    FAULTY,
     SMOOTH,
     Judgement,
     Least,
     NotRated,
+    judge_faults,
     judge_heat,
     judge_lives,
     judge_noise,
@@ -46,8 +46,6 @@ from femgear.stages.tooth_faults import fault_effects, fault_words
 _TO_A_HOUSING = "femgear casing CASE makes a gearbox of it, in a casing with sensors"
 """What gives a pair or a set of rigid bodies a level."""
 _NO_METHOD = NotRated("ISO 6336 has no safety of these teeth", "the verdict in numbers says why")
-_MOST_FAULTS = 3
-"""Faults that page one names."""
 _RESPONSES = "dynamics", "response", "runup", "branch"
 """Stages with motion."""
 
@@ -116,9 +114,7 @@ def _judge_faults(results: Any) -> Iterator[Judgement]:
     faults = fault_words(results.case)
     if faults:
         effects = "; ".join(fault_effects(results)) or "nothing is known: this run has no stage that shows it"
-        answer = ", ".join(faults[:_MOST_FAULTS])
-        answer += f" and {len(faults) - _MOST_FAULTS} more" if len(faults) > _MOST_FAULTS else ""
-        yield Judgement(FAULTY, "look", answer, effects, f"Faulty: {answer}")
+        yield judge_faults(faults, effects)
 
 
 def _missing_factors(results: Any, rating: Rating | None, shown: Sequence[Least]) -> list[str]:

@@ -17,6 +17,7 @@ from femgear.stages.judgements import (
     NotRated,
     doubt_words,
     estimates_words,
+    judge_faults,
     judge_heat,
     judge_lives,
     judge_noise,
@@ -32,6 +33,8 @@ from femgear.stages.judgements import (
 )
 from femgear.stages.strength import OF_ROOTS
 from femgear.stages.strength_results import SYMBOLS, taken_as_one
+from femgear.stages.tooth_faults import fault_words
+from femgear.trains.gearbox.case_file import teeth_of
 from femgear.trains.gearbox.mode_words import near_mode
 from femgear.trains.gearbox.response_results import OF_BOX_RESPONSE, line_origin, main_way
 from femgear.trains.gearbox.silence import why_silent
@@ -48,6 +51,8 @@ _RESPONSES = "dynamics", "runup", "balance", "transient"
 def gearbox_judgements(results: Any) -> Iterator[Judgement]:
     """Judge a gearbox."""
     stages, case, findings = results.stages, results.case, results.findings
+    if faults := gearbox_faults(case):
+        yield judge_faults(faults, "femgear compare with a run of whole teeth shows what it does")
     if "deflection" in stages:
         yield _strength(results)
         data, unknown = results.deflection, _listed(results.deflection, "without_life")
@@ -60,6 +65,12 @@ def gearbox_judgements(results: Any) -> Iterator[Judgement]:
     else:
         yield _unheard(results)
     yield judge_numbers(findings, results.manifest.complete)
+
+
+def gearbox_faults(case: Any) -> list[str]:
+    """Name the faulty teeth of all stages: ``"stage 1 planet 1, tooth 3: crack of 1.5 mm"``."""
+    stages = [(stage.name, teeth_of(stage)) for stage in (*case.pair, *case.planetary)]
+    return [f"{name} {words}" for name, teeth in stages if teeth is not None for words in fault_words(teeth)]
 
 
 def _strength(results: Any) -> Judgement:

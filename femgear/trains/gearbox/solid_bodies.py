@@ -15,12 +15,14 @@ from typing import Any
 
 import numpy as np
 
-from femgear.case.gear_set import planetary_set
+from femgear.case.gear_set import planetary_set, set_deviations
 from femgear.errors import FemgearError
 from femgear.gears.gear import Gear
+from femgear.gears.short_teeth import marked_teeth, renumbered, short_teeth
 from femgear.report.space import SPACE, Motion, SpaceBody, space, tooth_section
-from femgear.stages.gears_in_space import MODES_SHOWN, tooth_angles
+from femgear.stages.gears_in_space import MODES_SHOWN, teeth_zero, tooth_angles
 from femgear.stages.protocol import Drawn
+from femgear.stages.tooth_faults import fault_words
 from femgear.storage.files import write_text
 from femgear.trains.gearbox.case_file import (
     CASING,
@@ -273,7 +275,20 @@ def _of_pair(case: GearboxCase, pair: PairSection, drawn: dict[tuple[str, float,
         pitch = sizes.base_radii[number] / math.cos(sizes.pressure_angles[0])
         internal = sizes.internal and number == 1
         teeth = _Teeth(gears[number], number, pitch, hands[number], angle, internal)
-        yield _gear(_Seat(words, name, (shaft.axis[0], shaft.axis[1]), middle), sizes, teeth)
+        body = _gear(_Seat(words, name, (shaft.axis[0], shaft.axis[1]), middle), sizes, teeth)
+        yield _with_faults(pair, body, (number, 0))
+
+
+def _with_faults(stage: PairSection | BoxPlanetarySection, body: SpaceBody, at: tuple[int, int]) -> SpaceBody:
+    """Mark the faulty teeth of a gear, ``at`` its number in the stage and that of its copy; short ones are drawn so."""
+    section = teeth_of(stage)
+    if section is None or not (faults := set_deviations(section).faults):
+        return body
+    gears: Any = planetary_set(section)
+    words = [f"{stage.name} {text}" for text in fault_words(section)]
+    short, marked = (teeth.get(at, ()) for teeth in (short_teeth(faults, gears), marked_teeth(faults, words)))
+    first, count = -teeth_zero(gears)[at[0]][at[1]], body.teeth
+    return replace(body, short=renumbered(short, first, count), marked=renumbered(marked, first, count))
 
 
 def _as_long(key: tuple[str, float, int], drawn: dict[tuple[str, float, int], float]) -> float | None:
@@ -295,13 +310,13 @@ def _of_set(case: GearboxCase, stage: BoxPlanetarySection, places: dict[str, np.
     seat = f"seat ring of {stage.name}"
     in_casing = seat if seat in places else CASING
     sun = _Teeth(gears[0], 0, sizes.centre_distance - planet, 1.0, of_sun[0])
-    yield _gear(_Seat(f"sun of {stage.name}", stage.sun, axis, middle), sizes, sun)
+    yield _with_faults(stage, _gear(_Seat(f"sun of {stage.name}", stage.sun, axis, middle), sizes, sun), (0, 0))
     for number, (psi, angle) in enumerate(zip(angles, of_planets, strict=True), start=1):
         name, distance = f"{stage.name} planet {number}", sizes.centre_distance
         x, y = axis[0] + distance * math.cos(psi), axis[1] + distance * math.sin(psi)
         z = float(places[name][2]) if name in places else middle
         teeth = _Teeth(gears[1], 1, planet, -1.0, angle)
-        yield _gear(_Seat(name, name, (x, y), z), sizes, teeth)
+        yield _with_faults(stage, _gear(_Seat(name, name, (x, y), z), sizes, teeth), (1, number - 1))
     ring = _Teeth(gears[2], 2, sizes.centre_distance + planet, -1.0, of_ring[0], internal=True)
     member = in_casing if stage.ring == CASING else stage.ring
-    yield _gear(_Seat(f"ring of {stage.name}", member, axis, middle), sizes, ring)
+    yield _with_faults(stage, _gear(_Seat(f"ring of {stage.name}", member, axis, middle), sizes, ring), (2, 0))

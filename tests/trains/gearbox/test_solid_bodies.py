@@ -10,9 +10,12 @@ from casings import answer_in_a_casing
 from matplotlib.path import Path as Outline
 
 from femgear.report.space import SPACE, SpaceBody
+from femgear.stages.gears_in_space import case_bodies
 from femgear.stages.protocol import Drawn
 from femgear.trains.gearbox.case_file import CASING
+from femgear.trains.gearbox.judgements import gearbox_faults
 from femgear.trains.gearbox.solid_bodies import _casing_box, gearbox_bodies, write_space
+from femgear.trains.gearbox_of_case import gearbox_of_case
 from femgear.trains.reading import read_case, with_value
 
 pytestmark = pytest.mark.usefixtures("coarse_states")
@@ -95,6 +98,22 @@ def test_the_box_of_a_casing_holds_gears_feet_and_sensors():
     shaft = SpaceBody("shaft", "shaft", "a", (0.1, 0.0), (-1.0, 1.0), ((0.0, 0.01), (0.0, 0.01)))
     low, high = _casing_box([gear, foot, shaft])
     assert low == pytest.approx([-0.1, -0.2, 0.0]) and high == pytest.approx([0.15, 0.05, 0.1])
+
+
+def test_faulty_teeth_of_a_stage_are_marked_where_those_of_the_set_are():
+    cracked = read_case(CASES / "cracked_planet.toml")
+    alone = {body.name: body for body in case_bodies(cracked)}
+    box = read_case(gearbox_of_case(cracked).tables)
+    marked = {body.name: body for body in gearbox_bodies(box, {}) if body.marked}
+    assert list(marked) == ["set planet 1"]
+    ((tooth, words),) = marked["set planet 1"].marked
+    assert words == "set planet 1, tooth 3: crack of 1.5 mm" and gearbox_faults(box) == [words]
+    # at the same angle to the line between the axes, in a set that may be turned as a whole
+    at = [
+        body.angle + 2.0 * np.pi * number / 40 - np.arctan2(body.axis[1], body.axis[0])
+        for body, number in ((marked["set planet 1"], tooth), (alone["planet 1"], alone["planet 1"].marked[0][0]))
+    ]
+    assert np.angle(np.exp(1j * (at[0] - at[1]))) == pytest.approx(0.0, abs=1e-6)
 
 
 def test_teeth_roll_on_one_another(axle):
