@@ -245,10 +245,7 @@ def test_a_part_that_is_heard_has_lines_at_all_its_turns():
 
 def test_lines_of_two_parts_that_nearly_meet_are_those_of_the_nearer():
     """22/20/62: places of the sun are elevenths of an order, those of a planet tenths."""
-    angles, teeth = (
-        np.radians([0.0, 120.0, 240.0 + 360.0 / 84.0 * 0.0]) + np.radians([0.0, 360.0 / 84.0, 0.0]),
-        (62, 22, 20),
-    )
+    angles, teeth = np.radians([0.0, 120.0 + 360.0 / 84.0, 240.0]), (62, 22, 20)
     of_sun = 62 + 42 / 11 * np.arange(1, 11)
     places = classify_lines(of_sun, angles, teeth, tolerance=0.02)
     assert {place.part for place in places} == {"sun"}

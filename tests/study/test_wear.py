@@ -101,6 +101,7 @@ def test_stages_of_a_gearbox_wear_as_their_pair_does(pair, worn):
         (WearRequest(-1.0, 1e-18), {"--hours"}),
         (WearRequest(1.0, 1.0, steps=0, speed="0 rpm"), {"--coefficient", "--steps", "--speed"}),
         (WearRequest(1.0, 1e-18, speed="5 mm"), {"--speed"}),
+        (WearRequest(1e9, 1e-12, steps=1), {"--hours"}),
     ],
 )
 def test_what_cannot_be_asked_is_refused_at_once(pair, request_, keys):
