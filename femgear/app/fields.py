@@ -150,7 +150,7 @@ class Form:
                 state for at, (state, _) in self._said.items() if at == key or at.startswith((f"{key}.", f"{key}["))
             }
             icon = "error" if "bad" in states else "warning" if "look" in states else ""
-            fold.props(f'icon="{icon}"' if icon else "icon=")
+            fold.props(f'icon="{icon}"') if icon else fold.props(remove="icon")
 
     def _fold(self, table: Table, key: str, value: Any) -> None:
         """Draw the fold of a table, whose fields are made when it is opened."""
@@ -275,7 +275,7 @@ class Form:
         """Show what is said of an entry, and what holds where it is left out."""
         state, text = self._said.get(key, ("", ""))
         field.error = text if state == "bad" else None
-        field.props(f"hint={json.dumps(text)}" if state == "look" else "hint=")
+        field.props(f"hint={json.dumps(text)}") if state == "look" else field.props(remove="hint")
         held = self._values.get(key)
         if isinstance(held, (int, float)) and not isinstance(held, bool):
             held = f"{held / entry.scale:.6g} {entry.unit}".strip()

@@ -12,7 +12,7 @@ from typing import Any, Literal
 
 Kind = Literal["quantity", "integer", "number", "choice", "switch", "text", "list", "other"]
 STEPS = 200
-"""Of a slider."""
+"""Of a slider, at least."""
 _NUMBER = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(.*?)\s*")
 _USUAL = (
     r"operation\.torque",
@@ -279,8 +279,12 @@ class Slider:
 
     @property
     def step(self) -> float:
-        """From one place to the next."""
-        return 1.0 if self.whole else (self.high - self.low) / STEPS
+        """From one place to the next, a round number."""
+        if self.whole:
+            return 1.0
+        largest = (self.high - self.low) / STEPS
+        power = math.floor(math.log10(largest))
+        return max(step for digit in (1, 2, 5) if (step := float(f"{digit}e{power}")) <= largest * (1.0 + 1e-9))
 
     def entry_value(self, place: float) -> Any:
         """Value of the entry at a place of the slider, as the file holds it."""

@@ -23,15 +23,13 @@ class Filled:
     """A case file in a form of which some folds are open."""
 
     def __init__(self, *opened: str) -> None:
-        from nicegui import ElementFilter, ui
-
         from femgear.app.fields import Form, form_of_model
 
         self.text, self.changes, self.pinned, self.table = TEXT, [], [], form_of_model(None)
         self.form = Form(self.change, self.change_rows, self.pinned.append)
         self.form.follow(self.table, self.tables)
         for name in opened:
-            next(fold for fold in ElementFilter(kind=ui.expansion) if fold.text.startswith(name)).value = True
+            self.fold(name).value = True
 
     @property
     def tables(self):
@@ -56,6 +54,11 @@ class Filled:
         from nicegui import ElementFilter
 
         return next((e for e in ElementFilter() if e.props.get("data-key") == key), None)
+
+    def fold(self, name):
+        from nicegui import ElementFilter, ui
+
+        return next(fold for fold in ElementFilter(kind=ui.expansion) if fold.text.startswith(name))
 
     def button(self, name):
         from nicegui import ElementFilter, ui
@@ -122,5 +125,8 @@ def test_what_is_said_stands_beside_the_fields(filled):
     filled.form.say([problem], [finding], {})
     assert filled.field("operation.torque").error == "no torque; give one [E-UNIT]"
     assert filled.field("operation.input").props["hint"] == "look (allowed: a) [W-X]"
+    assert filled.fold("operation").props["icon"] == "error"
+    filled.form.say([], [finding], {})
+    assert filled.field("operation.torque").error is None and filled.fold("operation").props["icon"] == "warning"
     filled.form.say([], [], {})
-    assert filled.field("operation.torque").error is None
+    assert "icon" not in filled.fold("operation").props and "hint" not in filled.field("operation.input").props

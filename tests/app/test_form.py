@@ -165,3 +165,14 @@ def test_cases_within_a_case_have_forms_of_their_own():
     keys = [*keys_of(box, tables, embedded=embedded)]
     assert "pair[0].teeth.gear_1.teeth" in keys and "pair[0].teeth" not in keys
     assert "pair[0].teeth" in [*keys_of(box, tables)]
+
+
+@pytest.mark.parametrize(
+    ("value", "step", "moved"),
+    [("9.73 N m", 0.05, "10.25 N m"), ("100 N m", 1.0, "101 N m"), ("3 um", 0.02, "3.14 um"), (0.05, 0.0005, 0.0525)],
+)
+def test_places_of_a_slider_are_round_numbers(value, step, moved):
+    slider = slider_of("a", value, None)
+    assert slider.step == step and (slider.high - slider.low) / step >= 200 - 1e-6
+    number = moved if isinstance(moved, float) else float(moved.split()[0])
+    assert abs(number / step - round(number / step)) < 1e-6 and slider.entry_value(number) == moved
