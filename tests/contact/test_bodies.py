@@ -144,6 +144,7 @@ def test_factors_of_the_standards_for_two_materials():
     assert root_face_width(0.022, 0.02, 2e-3) == 0.022
 
 
+@pytest.mark.decisive
 def test_waves_across_the_face_in_common_bend_no_more_than_that_part_of_a_wider_body():
     """Plane part and change together are the same for a wide and a narrow body; neither falls below zero."""
     found = []

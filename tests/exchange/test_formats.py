@@ -142,6 +142,7 @@ def test_progress_counts_the_signals(results, tmp_path):
     assert told == [("sound", done, len(names)) for done in range(len(names) + 1)]
 
 
+@pytest.mark.decisive
 def test_order_cuts_are_written_in_the_level_that_is_asked_for(results, tmp_path):
     own_files(tmp_path / "a", ())
     stages, told = len(results.stages), []

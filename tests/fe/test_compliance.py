@@ -271,6 +271,7 @@ def test_cyclic_modes_are_those_of_the_whole_body(gear, sector, whole):
         np.testing.assert_allclose(found, expected, rtol=1e-9)
 
 
+@pytest.mark.decisive
 @pytest.mark.parametrize("smooth", [False, True])
 def test_reduced_ring_is_statically_complete(gear, sector, smooth):
     """Modes plus static shape give the exact cyclic compliance of the load, whatever the cut-off.

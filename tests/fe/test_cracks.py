@@ -92,6 +92,7 @@ def test_the_update_is_the_ring_with_one_cracked_sector(sun, parts):
     assert np.abs(cracked - whole - change).max() < 1e-12 * np.abs(whole).max()
 
 
+@pytest.mark.decisive
 def test_faces_open_as_the_whole_ring_says(sun, parts):
     """Openings per load of a flank and per force on the faces, with the faces as further loads of one sector."""
     before, after = parts

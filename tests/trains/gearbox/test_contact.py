@@ -86,6 +86,7 @@ def test_the_loads_of_the_gearbox_stand_in_the_tables():
     assert stage.teeth["operation"]["torque"] == "100 N m"
 
 
+@pytest.mark.decisive
 def test_forces_follow_from_the_torque():
     stage = read_case(pair_tables(teeth=True)).pair[0]
     found = stage_contact(stage, 100.0, np.zeros(1), slices=5)

@@ -116,6 +116,7 @@ def test_a_run_on_feet_has_pictures_tables_and_signals_of_its_response(tmp_path)
     assert {path.name for path in (tmp_path / "exported").iterdir()} == {*files}
 
 
+@pytest.mark.decisive
 def test_changes_leave_the_stages_that_they_do_not_decide():
     tables = pair_tables() | {"casing": casing_tables(), "dynamics": {"up_to": "2 kHz"}}
     tables["sensor"] = [{"name": "top", "position": ["90 mm", "80 mm", "40 mm"], "direction": "y"}]
