@@ -8,7 +8,7 @@ import pytest
 
 from femgear.contact.bodies import make_bodies, make_sectors
 from femgear.contact.cycle import CycleOptions, planet_symmetry, walk_mesh_cycle
-from femgear.contact.loaded_period import SHORTEST, LoadedPeriod, loaded_period
+from femgear.contact.loaded_period import SHORTEST, LoadedPeriod, _repetition, loaded_period
 from femgear.contact.supports import Supports
 from femgear.fe.elasticity import Material
 from femgear.gears.deviations import Runout, no_deviations, planet_shift
@@ -249,6 +249,7 @@ def test_planets_repeat_one_another_where_errors_turn(bodies, coarse, torque, an
     """Of the record one part is solved: all of it is what a walk finds at its positions."""
     gears = small_set(equal_planet_angles(4) if angles == 4 else angles)
     d = replace(no_deviations(gears), **changes)
+    assert (_repetition(gears, torque, d, periods)[1] / periods).denominator == parts
     options = dict(sun_torque=torque, supports=SUPPORTS, deviations=d)
     found = loaded_period(gears, bodies, bodies, positions=8, **options)
     assert found.periods == periods and found.position[-1] < periods

@@ -107,6 +107,7 @@ def test_kinds_come_in_turn_and_draws_differ(plan):
     assert all(50.0 <= case.operation.torque <= 100.0 for case in cases)
 
 
+@pytest.mark.decisive
 def test_machines_that_take_longest_are_begun_first(case):
     plan = fault_plan(case, FaultRequest(count=80, each=2, seed=3, duration="0.05 s"), cache=grid_cache())
     order = longest_first(machine_times(plan, range(40)))
