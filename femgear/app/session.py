@@ -39,6 +39,7 @@ class Session:
         self.folder = folder.resolve()
         self.name, self.text = "", ""
         self._saved: str | None = None
+        self._begun_from: str | None = None  # text of the file when editing began, which may be in an earlier process
         self._kept: str | None = None  # in the draft, by this session: other windows have the same file for theirs
         self._before: list[str] = []
         self._after: list[str] = []
@@ -65,6 +66,8 @@ class Session:
         saved, draft = _read(path) if path.is_file() else None, _draft(path)
         self.name, self._saved, self._before, self._after = name, saved, [], []
         self._kept = _read(draft) if draft.is_file() else None
+        base = _base(path)
+        self._begun_from = saved if self._kept is None or not base.is_file() else _read(base)
         self.text = (saved or "") if self._kept is None else self._kept
         if not self.unsaved:
             self._drop_draft()
@@ -91,6 +94,7 @@ class Session:
         """
         self.check_new(name)
         self.name, self.text, self._saved, self._before, self._after = name, text, None, [], []
+        self._begun_from = None
         self.keep()
 
     def change(self, key: str, value: Any) -> None:
@@ -134,6 +138,8 @@ class Session:
             if self.unsaved:
                 files.write_text(self.text, _draft(self.path))
                 self._kept = self.text
+                if self._begun_from is not None:
+                    files.write_text(self._begun_from, _base(self.path))
             else:
                 self._drop_draft()
 
@@ -142,6 +148,7 @@ class Session:
         draft = _draft(self.path)
         if draft.is_file() and _read(draft) in (self._kept, self.text):
             draft.unlink(missing_ok=True)
+            _base(self.path).unlink(missing_ok=True)
 
     def save(self) -> None:
         """Write the case file.
@@ -152,13 +159,13 @@ class Session:
             E-CHANGED: another program changed the file since it was read; E-STORAGE: it cannot be written.
         """
         there = _read(self.path) if self.path.is_file() else None
-        if there != self._saved and there != self.text:
-            remedy = "open the file again, or save under another name"
+        if there != self._begun_from and there != self.text:
+            remedy = "save under another name, or discard the changes made here"
             raise StorageError(
                 "the file was changed by another program", code="E-STORAGE", file=self.name, remedy=remedy
             )
         files.write_text(self.text, self.path)
-        self._saved = self.text
+        self._saved = self._begun_from = self.text
         self._drop_draft()
 
     def save_as(self, name: str) -> None:
@@ -166,11 +173,13 @@ class Session:
         former, text = self.path, self.text
         self.begin(name, text)
         self.save()
-        _draft(former).unlink(missing_ok=True)
+        for beside in (_draft(former), _base(former)):
+            beside.unlink(missing_ok=True)
 
     def discard(self) -> None:
         """Go back to the text of the file."""
-        if self._saved is not None:
+        if self.path.is_file():
+            self._saved = self._begun_from = _read(self.path)
             self.replace(self._saved)
             self.keep()
 
@@ -207,6 +216,11 @@ def _case_file(folder: Path, name: str) -> Path:
 def _draft(path: Path) -> Path:
     """File beside a case file, of what is not saved."""
     return path.with_name(f".{path.name}.draft")
+
+
+def _base(path: Path) -> Path:
+    """File beside a case file, of the text from which what is not saved was begun."""
+    return path.with_name(f".{path.name}.base")
 
 
 def _read(path: Path) -> str:

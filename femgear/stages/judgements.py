@@ -281,11 +281,11 @@ def judge_strength(
             f"{symbol} {least.value:.2f} {_AGAINST[symbol]} ({least.where})" for symbol, least, _ in low
         )
         return Judgement(STRONG, "bad", answer, limit, f"Not strong enough: {failing}")
+    faulty = "W-FAULT" in doubts and bool(_raised(findings, ("W-FAULT",)))
+    begin = "But for the faulty teeth strong enough" if faulty else "Strong enough"
     if missing:
-        return Judgement(
-            STRONG, "look", answer, limit, f"Strong enough as far as it is rated: {in_sentence}; {missing}"
-        )
-    return Judgement(STRONG, "look" if reasons else "good", answer, limit, f"Strong enough: {in_sentence}")
+        return Judgement(STRONG, "look", answer, limit, f"{begin} as far as it is rated: {in_sentence}; {missing}")
+    return Judgement(STRONG, "look" if reasons else "good", answer, limit, f"{begin}: {in_sentence}")
 
 
 def judge_lives(
@@ -376,8 +376,11 @@ def judge_heat(results: Any) -> Iterator[Judgement]:
     if unknown:
         efficiency, sentence = "efficiency not known", f"Nothing tells what the meshes of {unknown} lose"
     elif np.isfinite(values).any():
-        efficiency = f"efficiency {100.0 * np.nanmin(values):.2f} %, losses {np.nanmax(loss):,.0f} W"
-        sentence = f"It loses {np.nanmax(loss):,.0f} W"
+        at = int(np.nanargmax(loss))
+        efficiency = f"efficiency {100.0 * values[at]:.2f} %, losses {loss[at]:,.0f} W"
+        sentence = f"It loses {loss[at]:,.0f} W"
+        if len(loss) > 1 and "load_case" in results.losses.coords:
+            efficiency += f" ({results.losses['load_case'].values[at]})"
     else:
         return
     limits, below = list[str](), list[str]()

@@ -86,6 +86,31 @@ def test_the_draft_of_another_window_stays(tmp_path):
     assert Session(tmp_path).open("a.toml")
 
 
+def test_a_save_of_another_window_is_not_overwritten_after_a_restart(tmp_path):
+    """What was kept remembers the file from which it was begun."""
+    (tmp_path / "a.toml").write_text("a = 1\n")
+    first, second = Session(tmp_path), Session(tmp_path)
+    first.open("a.toml")
+    second.open("a.toml")
+    first.replace("a = 1\nb = 5\n")
+    first.keep()
+    second.replace("a = 2\n")
+    second.save()
+    again = Session(tmp_path)  # the server was killed and started again
+    assert again.open("a.toml") and again.text == "a = 1\nb = 5\n"
+    again.replace("a = 1\nb = 6\n")
+    with pytest.raises(StorageError, match="changed by another program"):
+        again.save()
+    assert (tmp_path / "a.toml").read_text() == "a = 2\n"
+    again.discard()
+    assert again.text == "a = 2\n" and not again.unsaved
+    again.replace("a = 3\n")
+    again.keep()
+    again.save()
+    assert (tmp_path / "a.toml").read_text() == "a = 3\n"
+    assert not [*tmp_path.glob(".a.toml.*")]
+
+
 @pytest.mark.parametrize(
     "name", ("../a.toml", "/etc/a.toml", "a.txt", "sub/a.toml", "", ".a.toml", "a\x00.toml", 300 * "a" + ".toml")
 )

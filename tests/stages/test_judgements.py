@@ -187,6 +187,14 @@ def test_heat_is_judged_by_scuffing(safety, state):
     assert not list(judge_heat(SimpleNamespace(stages=())))
 
 
+def test_efficiency_and_losses_are_those_of_one_load_case():
+    """That of the largest losses: coasting is less efficient, and loses less."""
+    of_cases = {"efficiency": ("load_case", [0.9764, 0.9708]), "loss": ("load_case", [779.0, 226.6])}
+    losses = xr.Dataset(of_cases, coords={"load_case": ["full torque", "coasting"]})
+    (judgement,) = judge_heat(SimpleNamespace(stages=("losses",), losses=losses))
+    assert judgement.answer == "efficiency 97.64 %, losses 779 W (full torque)"
+
+
 class Files(dict):
     """Results of some stages."""
 
