@@ -13,7 +13,8 @@ import pytest
 TOOLS = Path(__file__).parents[2] / "validation" / "tools"
 sys.path.append(str(TOOLS))
 
-from mutants import CORE, drawn, modules, mutants, mutated  # noqa: E402
+from mutants import CORE, ROOT, drawn, modules, mutants, mutated  # noqa: E402
+from mutation import equivalents  # noqa: E402
 
 SOURCE = '''
 def law(x: float = 1e-9, *, n: int = -1) -> "list[3]":
@@ -79,6 +80,15 @@ def test_a_seed_draws_a_third_of_signs_and_more_of_them_begin_alike():
     assert len(set(more)) == 60
     assert drawn(found, 12, 2) != few
     assert sorted(one.number for one in drawn(found, 10**6, 1)) == [one.number for one in found]
+
+
+@pytest.mark.slow
+def test_mutants_that_change_nothing_are_there():
+    """An entry whose function or expression has another name would be met again as a survivor."""
+    listed = {*equivalents()}
+    sources = {module: (ROOT / "femgear" / module).read_text(encoding="utf-8") for module, *_ in listed}
+    there = {mutant.name for module, source in sources.items() for mutant in mutants(module, source)}
+    assert listed and listed <= there, listed - there
 
 
 def test_the_core_has_all_its_modules():
