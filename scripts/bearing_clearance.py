@@ -60,21 +60,21 @@ def main(
     folder = ready_folder(output, FILES)
     with Progress() as progress:
         curves = []
-        for text, one in (*zip(clearance, plays), ("no bearing", None)):
+        for text, play_given in (*zip(clearance, plays), ("no bearing", None)):
             progress(f"resonance, {text}")
-            curves.append(_resonance(text, one, harmonics))
+            curves.append(_resonance(text, play_given, harmonics))
             progress(f"resonance, {text}", 1)
         progress("contact maps")
-        found = wedging_map(np.linspace(0.5, 15.0, frequencies), np.linspace(0.6, 1.8, points) * play, backlash=play)
+        wedging = wedging_map(np.linspace(0.5, 15.0, frequencies), np.linspace(0.6, 1.8, points) * play, backlash=play)
         progress("contact maps", 1)
-    save_figure(_map_figure(found, play), folder / "tooth_contact.png")
+    save_figure(_map_figure(wedging, play), folder / "tooth_contact.png")
     # stability is not asked for here
     drawn = [(text.replace(" um", " µm"), hertz, rms, np.ones(len(rms), int)) for text, hertz, rms, _ in curves]
     save_figure(response_branches(drawn, quantity="ring x, r.m.s."), folder / "ring_resonance.png")
     rows = [(text, float(f), float(r)) for text, hertz, rms, _ in curves for f, r in zip(hertz, rms)]
     write_csv(folder / "ring_resonance.csv", ("clearance", "frequency [Hz]", "ring x r.m.s. [m]"), rows)
-    write_csv(folder / "tooth_contact.csv", MAP_HEADER, _map_records(found))
-    _print(curves, found, play)
+    write_csv(folder / "tooth_contact.csv", MAP_HEADER, _map_records(wedging))
+    _print(curves, wedging, play)
     say_files(folder, FILES)
 
 
@@ -99,40 +99,40 @@ def _resonance(text, clearance, harmonics):
     )
 
 
-def _map_records(found):
-    for i, f in enumerate(found.frequency):
-        for j, c in enumerate(found.clearance):
-            yield float(f), float(c), float(found.drive[i, j].mean()), float(found.back[i, j].mean())
+def _map_records(contact):
+    for i, f in enumerate(contact.frequency):
+        for j, c in enumerate(contact.clearance):
+            yield float(f), float(c), float(contact.drive[i, j].mean()), float(contact.back[i, j].mean())
 
 
-def _map_figure(found, play):
+def _map_figure(contact, play):
     from published.wind_turbine import wind_turbine_a
     from published.wind_turbine_figures import contact_map
 
     rigid = 0.5 * play / np.sin(wind_turbine_a().pressure_angle_sun_planet)
-    panels = [("drive flanks", found.drive.mean(axis=2)), ("back flanks", found.back.mean(axis=2))]
-    return contact_map(found.frequency, found.clearance, panels, line=("play / (2 sin alpha)", rigid))
+    panels = [("drive flanks", contact.drive.mean(axis=2)), ("back flanks", contact.back.mean(axis=2))]
+    return contact_map(contact.frequency, contact.clearance, panels, line=("play / (2 sin alpha)", rigid))
 
 
-def _print(curves, found, play):
+def _print(curves, contact, play):
     from published.wind_turbine_response import wedging_onset
 
     rows = [(text, f"{hertz:.2f}", f"{1e6 * size:.1f}", end) for text, _, _, (hertz, size, end) in curves]
     header = ("bearing", "ring resonance [Hz]", "ring x r.m.s. [um]", "end of the branch")
     print_table("Resonance of the ring", header, rows)
-    missing = np.isnan(found.back[..., 0])
+    missing = np.isnan(contact.back[..., 0])
     if missing.any():
         print(f"{np.count_nonzero(missing)} of {missing.size} cells of the maps not converged: grey, left out")
-    known = wedging_onset(found)
+    onset = wedging_onset(contact)
     # an onset is one where the clearance below it is known not to touch
     sure = [
         i
-        for i, value in enumerate(known)
-        if np.isfinite(value) and not missing[i, : np.searchsorted(found.clearance, value)].any()
+        for i, value in enumerate(onset)
+        if np.isfinite(value) and not missing[i, : np.searchsorted(contact.clearance, value)].any()
     ]
-    for i in np.setdiff1d(np.flatnonzero(np.isfinite(known)), sure):
-        print(f"at {found.frequency[i]:.3g} Hz where back flanks begin to touch is not known")
-    ratio, step = np.unique(np.round(known[sure] / play, 6)), np.diff(found.clearance)[0] / play
+    for i in np.setdiff1d(np.flatnonzero(np.isfinite(onset)), sure):
+        print(f"at {contact.frequency[i]:.3g} Hz where back flanks begin to touch is not known")
+    ratio, step = np.unique(np.round(onset[sure] / play, 6)), np.diff(contact.clearance)[0] / play
     if len(ratio):
         text = ", ".join(f"{value:.3g}" for value in ratio)
         note = f"(steps of {step:.3g}, {len(sure)} frequencies)"

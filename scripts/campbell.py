@@ -61,7 +61,7 @@ def main(
     folder = ready_folder(output, FILES)
     data = wind_turbine_a() if train == "A" else wind_turbine_b()
     orders = [1.0, *(RING_TEETH[train] * h for h in range(1, harmonics + 1))]
-    found = campbell_data(
+    campbell = campbell_data(
         lambda speed: gear_set_system(data, carrier_speed=speed),
         np.linspace(0.0, highest * RPM, speeds),
         data.mesh_stiffness,
@@ -71,22 +71,24 @@ def main(
     header = ("carrier speed [rpm]", "mode", "frequency [Hz]")
     records = (
         (float(speed / RPM), number + 1, float(value))
-        for speed, row in zip(found.speed, found.frequency)
+        for speed, row in zip(campbell.speed, campbell.frequency)
         for number, value in enumerate(row)
     )
     write_csv(folder / "campbell.csv", header, records)
-    save_figure(_figure(found, train), folder / "campbell.png")
-    rows = [(f"{c.order:g}", str(c.branch + 1), f"{c.speed / RPM:.2f}", f"{c.frequency:.2f}") for c in found.critical]
+    save_figure(_figure(campbell, train), folder / "campbell.png")
+    rows = [
+        (f"{c.order:g}", str(c.branch + 1), f"{c.speed / RPM:.2f}", f"{c.frequency:.2f}") for c in campbell.critical
+    ]
     print_table(f"Critical speeds of set {train}", ("order", "mode", "carrier [rpm]", "frequency [Hz]"), rows)
     say_files(folder, FILES)
 
 
-def _figure(found, train):
+def _figure(campbell, train):
     from femgear.report.style import BLACK, BLUE, GREY, SIZE, label, legend_below, new_figure
 
     figure, (ax,) = new_figure(width=8.5, height=5.6)
-    speed = found.speed / RPM
-    for values in found.frequency.T:
+    speed = campbell.speed / RPM
+    for values in campbell.frequency.T:
         ax.plot(speed, values, color=BLUE, label="mode")
         change = f"{values[0]:.3g} Hz"
         change += f" to {values[-1]:.3g} Hz" if abs(values[-1] / values[0] - 1.0) > 5e-3 else ""
@@ -98,29 +100,29 @@ def _figure(found, train):
             va="center",
             fontsize=SIZE - 1,
         )
-    top = 1.1 * found.frequency.max()
-    for number, order in enumerate(found.orders):
+    top = 1.1 * campbell.frequency.max()
+    for number, order in enumerate(campbell.orders):
         teeth = RING_TEETH[train]
         text = "weight, carrier speed" if order == 1.0 else f"mesh frequency × {order / teeth:g}"
         ax.plot(
             speed,
-            order * found.speed / (2.0 * np.pi),
+            order * campbell.speed / (2.0 * np.pi),
             color=GREY,
             linewidth=1.0,
             label=text,
             linestyle=(0, (6, 2) + (1, 2) * number),
         )
     named = []
-    for one in found.critical:
+    for crossing in campbell.critical:
         style = {"color": BLACK, "markerfacecolor": "none", "label": "critical speed [rpm]"}
-        ax.plot(one.speed / RPM, one.frequency, "o", **style)
-        place = np.array([one.speed / speed[-1] / RPM, one.frequency / top])
+        ax.plot(crossing.speed / RPM, crossing.frequency, "o", **style)
+        place = np.array([crossing.speed / speed[-1] / RPM, crossing.frequency / top])
         if any(np.abs(place - other).max() < 0.05 for other in named):
             continue
         named.append(place)
         ax.annotate(
-            f"{one.speed / RPM:.0f}",
-            (one.speed / RPM, one.frequency),
+            f"{crossing.speed / RPM:.0f}",
+            (crossing.speed / RPM, crossing.frequency),
             xytext=(6, 4),
             textcoords="offset points",
             fontsize=SIZE - 1,

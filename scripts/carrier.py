@@ -149,7 +149,7 @@ def mean_motions(points: np.ndarray, triangles: np.ndarray, place: np.ndarray) -
     shapes = np.array([r * (2 * r - 1), s * (2 * s - 1), t * (2 * t - 1), 4 * r * s, 4 * s * t, 4 * t * r])
     by_s = np.array([1 - 4 * r, 4 * s - 1, 0 * s, 4 * (r - s), 4 * t, -4 * t])
     by_t = np.array([1 - 4 * r, 0 * s, 4 * t - 1, -4 * s, 4 * s, 4 * (r - t)])
-    x, along, across = (np.einsum("kq,ekd->eqd", one, points[triangles]) for one in (shapes, by_s, by_t))
+    x, along, across = (np.einsum("kq,ekd->eqd", values, points[triangles]) for values in (shapes, by_s, by_t))
     area = np.linalg.norm(np.cross(along, across), axis=2) * np.array(TRIANGLE_WEIGHTS)
     directions = np.broadcast_to(np.eye(3)[:, None, None], (3, *x.shape))
     fields = np.concatenate([directions, np.cross(directions, x - place)])

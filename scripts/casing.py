@@ -182,7 +182,7 @@ def condensed(K, M, watched, carried, modes: int):
     static = lu.solve(B)
     static = np.linalg.solve((B.T @ static).T, static.T).T  # each mean moved by one, the others held
     T = np.zeros((len(watched), watched.shape[1] + carried.shape[1] + modes))
-    T[free] = np.hstack([static, *(one - static @ (B.T @ one) for one in (moved, shapes))])
+    T[free] = np.hstack([static, *(motions - static @ (B.T @ motions) for motions in (moved, shapes))])
     T[:, watched.shape[1] : -modes] += carried
     internal = T[:, -modes:]
     T[:, -modes:] = internal @ np.linalg.inv(np.linalg.cholesky(internal.T @ (M @ internal))).T
@@ -191,7 +191,7 @@ def condensed(K, M, watched, carried, modes: int):
 
 def six_digits(values) -> np.ndarray:
     """Numbers as a universal file holds them."""
-    return np.array([float(f"{one:.5e}") for one in np.ravel(values)]).reshape(np.shape(values))
+    return np.array([float(f"{value:.5e}") for value in np.ravel(values)]).reshape(np.shape(values))
 
 
 def in_six_digits(K, M, nodes):
@@ -200,7 +200,7 @@ def in_six_digits(K, M, nodes):
     Frequency [Hz], shape (m, r) of all free coordinates, stiffness, mass.
     """
     row = np.cumsum([0, *(len(dofs) for _, dofs, _ in nodes)])
-    first = next(i for i, one in enumerate(nodes) if one[0].startswith("foot"))
+    first = next(i for i, node in enumerate(nodes) if node[0].startswith("foot"))
     free = np.setdiff1d(np.arange(len(K)), np.arange(row[first], row[-1]))
     square, shape = eigh(K[np.ix_(free, free)], M[np.ix_(free, free)])
     frequency, shape = six_digits(np.sqrt(square) / (2 * np.pi)), six_digits(shape)
@@ -307,7 +307,7 @@ def main(
             write_casing(casing, folder)
             progress("casing", 1)
     frequency = np.load(folder / FILES[0])["natural_frequency"] / (2 * np.pi)
-    rows = [(str(i), f"{one:.1f}") for i, one in enumerate(frequency[:12], 1)]
+    rows = [(str(i), f"{hertz:.1f}") for i, hertz in enumerate(frequency[:12], 1)]
     print_table("Lowest natural frequencies, feet clamped", ("mode", "Hz"), rows)
     say_files(folder, FILES)
 

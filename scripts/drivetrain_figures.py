@@ -50,11 +50,11 @@ def backlash_figure(case, *, steps: int = 100_000):
     curves = [(f"teeth that part, {text}", run.force[shown, mesh])]
     if linear is not None:
         curves.append(("linear mesh, which pulls", linear.run.force[shown, mesh]))
-    found = (
+    words = (
         f"{run.meshes[mesh]} parts first at {run.time[first]:.4g} s; apart for "
         f"{run.lost[mesh]:.2%} of the first {run.time[-1]:.4g} s"
     )
-    return over_time(time, [(found, curves)], unit="mesh force [kN]", factor=1e-3), found
+    return over_time(time, [(words, curves)], unit="mesh force [kN]", factor=1e-3), words
 
 
 def separating_start(case, *, steps: int):

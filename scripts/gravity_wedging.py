@@ -102,8 +102,8 @@ def _follow(problem, limits, harmonics, stability):
     branch = weight_branch(problem, limits, harmonics=harmonics, stability=stability)
     rms = member_rms(problem, branch.solutions, "carrier")[:, 0]
     # 1 stable, 0 not, -1 not known
-    known = [one.stable for one in branch.verdicts] if stability else [None] * len(rms)
-    stable = np.array([-1 if one is None else int(one) for one in known])
+    verdicts_stable = [verdict.stable for verdict in branch.verdicts] if stability else [None] * len(rms)
+    stable = np.array([-1 if sure is None else int(sure) for sure in verdicts_stable])
     return branch, branch.parameter / (2.0 * np.pi), rms, stable
 
 
@@ -123,12 +123,12 @@ def _sweeps(result, hertz, steps):
     from femgear.solvers.time.stroboscopic import sweep_up_and_down
 
     problem = result[1]
-    found = sweep_up_and_down(problem, 2.0 * np.pi * hertz, steps=steps, most=100, tolerance=1e-4)
+    sweeps = sweep_up_and_down(problem, 2.0 * np.pi * hertz, steps=steps, most=100, tolerance=1e-4)
     curves, rows = [], []
-    for text, one in zip(("upwards", "downwards"), found):
-        rms = sweep_rms(problem, one, steps=steps)
-        curves.append((f"integration {text}", one.frequency / (2.0 * np.pi), rms))
-        for omega, size, settled in zip(one.frequency, rms, one.settled):
+    for text, sweep in zip(("upwards", "downwards"), sweeps):
+        rms = sweep_rms(problem, sweep, steps=steps)
+        curves.append((f"integration {text}", sweep.frequency / (2.0 * np.pi), rms))
+        for omega, size, settled in zip(sweep.frequency, rms, sweep.settled):
             near = _beside(result, omega, size)
             rows.append((text, float(omega / (2.0 * np.pi)), float(size), "yes" if settled else "no", near))
     return curves, rows
@@ -144,10 +144,10 @@ def _beside(result, omega: float, size: float) -> float:
     _, problem, branch, _, rms, _ = result
     away = np.abs(branch.parameter - omega) / np.ptp(branch.parameter) + np.abs(rms - size) / rms.max()
     start = branch.solutions[int(np.argmin(away))]
-    found = solve_harmonic_balance(
+    solution = solve_harmonic_balance(
         problem, omega, orders=branch.orders, start=start, reduction=drive_reduction(problem), stability=False
     )
-    return float(member_rms(problem, [found], "carrier")[0, 0]) if found.converged else float("nan")
+    return float(member_rms(problem, [solution], "carrier")[0, 0]) if solution.converged else float("nan")
 
 
 def _print_sweeps(rows):
@@ -184,7 +184,7 @@ def _details(folder, result) -> None:
     forces = bearing_history(problem, branch.solutions[top], phase)
     curves = [(f"planet {n + 1}", force) for n, force in enumerate(forces)]
     save_figure(bearing_forces(phase, curves, title=title), folder / "planet_bearings.png")
-    shares = np.array([contact_shares(problem, one)[[0, 3, 6, 9]] for one in branch.solutions])
+    shares = np.array([contact_shares(problem, solution)[[0, 3, 6, 9]] for solution in branch.solutions])
     figure = contact_over_frequency(hertz, shares, FLANKS, title=_play(text))
     save_figure(figure, folder / "tooth_contact.png")
 
@@ -196,9 +196,9 @@ def _play(text: str) -> str:
 
 def _records(results):
     for text, _, branch, hertz, rms, stable in results:
-        known = len(branch.verdicts) > 0
+        computed = len(branch.verdicts) > 0
         for number, (f, size, sure) in enumerate(zip(hertz, rms, stable)):
-            yield text, number, float(f), float(size), ("yes" if sure else "no") if known else "not computed"
+            yield text, number, float(f), float(size), ("yes" if sure else "no") if computed else "not computed"
 
 
 def _print(results):

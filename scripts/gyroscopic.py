@@ -119,21 +119,21 @@ def followed(result, centre_distance: float, speeds, below: float) -> Branches:
     count = int(np.count_nonzero(modes.frequency[elastic] < below))
     if not count:
         raise CaseError(f"no modes below {below:g} Hz", code="E-RANGE", limit="a higher frequency")
-    found = campbell_data(
+    campbell = campbell_data(
         lambda speed: turning_system(model, centre_distance=centre_distance, carrier_speed=speed),
         speeds,
         modes.mesh_stiffness,
         count=count,
     )
-    asked = found.tracked.given
-    shares = ring_wave_shares(model, found.tracked.shape[-1])
+    speeds_given = campbell.tracked.given
+    shares = ring_wave_shares(model, campbell.tracked.shape[-1])
     largest = len(shares) // 2
     wave = np.argmax(shares, axis=0) - largest
     columns, whole = np.arange(count), shares.sum(axis=0)
     both = shares[largest + wave, columns] + (wave != 0) * shares[largest - wave, columns]
     return Branches(
-        speed=found.speed[asked],
-        frequency=found.frequency[asked],
+        speed=campbell.speed[speeds_given],
+        frequency=campbell.frequency[speeds_given],
         kind=tuple(modes.kind[i] for i in elastic[:count]),
         share=whole,
         wave=wave,
@@ -224,12 +224,12 @@ def ring_wave_shares(model, shape) -> np.ndarray:
 
 def bare_ring(modes, below: float) -> list[tuple[int, float]]:
     """Nodal diameters, from 1, and lowest frequencies [Hz] of the ring alone on its foundation."""
-    found = []
+    diameters = []
     for n in range(1, int(modes.nodal_diameter.max()) + 1):
         frequency = float(modes.frequency[modes.nodal_diameter == n].min())
         if frequency < below:
-            found.append((n, frequency))
-    return found
+            diameters.append((n, frequency))
+    return diameters
 
 
 def _wave(branches: Branches, i: int) -> str:
@@ -238,11 +238,11 @@ def _wave(branches: Branches, i: int) -> str:
 
 
 def _print(branches: Branches, ring, top: float, highest: str) -> None:
-    change, heard = branches.change[-1], branches.heard
+    change, fixed_ear = branches.change[-1], branches.heard
     rows = []
     for i, kind in enumerate(branches.kind):
         still = branches.frequency[0, i]
-        on_ring = (f"{heard[i]:.2f}", f"{100.0 * (heard[i] / still - 1.0):+.3f}")
+        on_ring = (f"{fixed_ear[i]:.2f}", f"{100.0 * (fixed_ear[i] / still - 1.0):+.3f}")
         if branches.standing[i]:
             apart = abs(branches.wave[i]) * top / (2.0 * np.pi)
             on_ring = (f"{branches.frequency[-1, i]:.2f} ± {apart:.2f}", f"± {100.0 * apart / still:.3f}")
@@ -328,8 +328,8 @@ def _figure(branches: Branches, ring, top: float):
     )
     # standing waves are heard as two lines, one a sense
     much, apart = branches.share > 0.25, branches.wave * top / (2.0 * np.pi)
-    heard = [(branches.heard, much), (branches.frequency[-1] + apart, much & branches.standing)]
-    for line, shown in heard:
+    lines = [(branches.heard, much), (branches.frequency[-1] + apart, much & branches.standing)]
+    for line, shown in lines:
         right.plot(
             still[shown],
             100.0 * (line / still - 1.0)[shown],

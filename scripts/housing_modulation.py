@@ -61,14 +61,14 @@ def main(
     with Progress() as progress:
         static, dynamics, housing = _solve(data, progress)
         _check_harmonic(harmonic, dynamics.response.force.shape[-1] - 1)
-        heard = _bands(data, static, dynamics, housing, harmonic)
+        band_models = _bands(data, static, dynamics, housing, harmonic)
         progress("pictures", 0, 1)
-        _draw(folder, speed, heard, static.planetary_set.ring.teeth)
-        _export(folder, static.planetary_set, dynamics, heard)
+        _draw(folder, speed, band_models, static.planetary_set.ring.teeth)
+        _export(folder, static.planetary_set, dynamics, band_models)
         progress("pictures", 1, 1)
-    header = CSV_HEADER if heard.linear is None else (*CSV_HEADER, LINEAR)
-    write_csv(folder / "lines.csv", header, _records(heard, static.planetary_set.ring.teeth))
-    _print_lines(heard, dynamics, speed)
+    header = CSV_HEADER if band_models.linear is None else (*CSV_HEADER, LINEAR)
+    write_csv(folder / "lines.csv", header, _records(band_models, static.planetary_set.ring.teeth))
+    _print_lines(band_models, dynamics, speed)
     say_files(folder, FILES)
 
 
@@ -127,16 +127,16 @@ def _bands(case, static, dynamics, housing, harmonic) -> Heard:
     forces = dynamics.response.force[:, gears.n_planets :]
     field = hanning_model(forces, gears.planet_angles)
     windowed = fixed_sensor_lines(field, gears.ring.teeth, carrier, case.housing.sensor_angle)
-    found = {}
+    spectra = {}
     models = {"exact": housing.exact, "Hanning": windowed}
     if housing.form == "linear":
         models["linear"] = housing.lines
     for name, lines in models.items():
         spectrum = OrderSpectrum(lines.order, lines.acceleration[0])
-        found[name] = (spectrum, analyse_band(spectrum, gears.ring.teeth, harmonic))
-    order = np.arange(found["exact"][1].low, found["exact"][1].high + 1)
-    values = {name: np.zeros(len(order)) for name in found}
-    for name, (spectrum, _) in found.items():
+        spectra[name] = (spectrum, analyse_band(spectrum, gears.ring.teeth, harmonic))
+    order = np.arange(spectra["exact"][1].low, spectra["exact"][1].high + 1)
+    values = {name: np.zeros(len(order)) for name in spectra}
+    for name, (spectrum, _) in spectra.items():
         inside = (spectrum.order >= order[0]) & (spectrum.order <= order[-1])
         values[name][spectrum.order[inside] - order[0]] = spectrum.amplitude[inside]
     scale = values["exact"].max() / (values["Hanning"].max() or 1.0)
@@ -146,75 +146,77 @@ def _bands(case, static, dynamics, housing, harmonic) -> Heard:
         values.get("linear"),
         values["exact"],
         values["Hanning"] * scale,
-        {name: band for name, (_, band) in found.items()},
+        {name: band for name, (_, band) in spectra.items()},
     )
 
 
-def _records(heard: Heard, teeth: int):
-    for k, order in enumerate(heard.order):
-        offset = int(order) - heard.harmonic * teeth
-        models = (heard.exact, heard.hanning) + (() if heard.linear is None else (heard.linear,))
+def _records(band_models: Heard, teeth: int):
+    for k, order in enumerate(band_models.order):
+        offset = int(order) - band_models.harmonic * teeth
+        models = (band_models.exact, band_models.hanning) + (
+            () if band_models.linear is None else (band_models.linear,)
+        )
         values = (float(v[k]) for v in models)
-        yield int(order), heard.harmonic, offset, *values
+        yield int(order), band_models.harmonic, offset, *values
 
 
-def _print_lines(heard: Heard, dynamics, speed: str):
-    strongest = np.argsort(-heard.exact, kind="stable")[:8]
-    centre = (heard.order[0] + heard.order[-1]) // 2
+def _print_lines(band_models: Heard, dynamics, speed: str):
+    strongest = np.argsort(-band_models.exact, kind="stable")[:8]
+    centre = (band_models.order[0] + band_models.order[-1]) // 2
     rows = [
         (
-            f"{heard.order[k]} = {centre} {heard.order[k] - centre:+d}",
-            f"{heard.exact[k]:.4g}",
-            f"{heard.hanning[k]:.4g}",
-            *(() if heard.linear is None else (f"{heard.linear[k]:.4g}",)),
+            f"{band_models.order[k]} = {centre} {band_models.order[k] - centre:+d}",
+            f"{band_models.exact[k]:.4g}",
+            f"{band_models.hanning[k]:.4g}",
+            *(() if band_models.linear is None else (f"{band_models.linear[k]:.4g}",)),
         )
         for k in sorted(strongest)
-        if heard.exact[k] > 1e-6 * heard.exact.max()
+        if band_models.exact[k] > 1e-6 * band_models.exact.max()
     ]
-    title = f"{speed}, mesh harmonic {heard.harmonic} (mesh frequency {dynamics.response.mesh_frequency[0]:g} Hz)"
+    title = f"{speed}, mesh harmonic {band_models.harmonic} (mesh frequency {dynamics.response.mesh_frequency[0]:g} Hz)"
     header = ("carrier order", "exact [m/s^2]", "Hanning, scaled [m/s^2]")
-    header += () if heard.linear is None else (LINEAR,)
+    header += () if band_models.linear is None else (LINEAR,)
     print_table(f"Strongest lines at {title}", header, rows)
-    for name, band in heard.bands.items():
+    for name, band in band_models.bands.items():
         strong = ", ".join(f"{line.order:g}" for line in band.lines[:2])
         lobes = len(band.lobes.position)
         print(f"{name}: {lobes} lobes of the envelope a revolution, strongest lines {strong}")
-    threshold = heard.bands["exact"].lobes.threshold
+    threshold = band_models.bands["exact"].lobes.threshold
     print(f"a lobe stands out by at least {threshold:.0%} of the largest envelope value")
 
 
-def _draw(folder: Path, speed: str, heard: Heard, teeth: int) -> None:
+def _draw(folder: Path, speed: str, band_models: Heard, teeth: int) -> None:
     from femgear.report.style import save_figure
 
-    save_figure(_spectrum_figure(speed, heard, teeth), folder / "order_spectrum.png")
-    save_figure(_envelope_figure(speed, heard), folder / "envelope.png")
+    save_figure(_spectrum_figure(speed, band_models, teeth), folder / "order_spectrum.png")
+    save_figure(_envelope_figure(speed, band_models), folder / "envelope.png")
 
 
-def _spectrum_figure(speed: str, heard: Heard, teeth: int):
+def _spectrum_figure(speed: str, band_models: Heard, teeth: int):
     """Lines of the band: the ring's field above, the Hanning model below."""
     from femgear.report.style import BLUE, ORANGE, VERMILION, label, legend_below, new_figure
 
     figure, axes = new_figure(rows=2, width=9.5, height=7.0, sharex=True)
-    drawn, form = heard.exact, "ring field, exact circumferential Fourier"
-    if heard.linear is not None:
-        drawn, form = heard.linear, "ring field, Heaviside and linear interpolation"
-    top = max(heard.exact.max(), drawn.max()) or 1.0
+    drawn, form = band_models.exact, "ring field, exact circumferential Fourier"
+    if band_models.linear is not None:
+        drawn, form = band_models.linear, "ring field, Heaviside and linear interpolation"
+    top = max(band_models.exact.max(), drawn.max()) or 1.0
     floor = 3e-4 * top
-    centre = heard.harmonic * teeth
+    centre = band_models.harmonic * teeth
     for ax, values, colour, text in (
         (axes[0], drawn, BLUE, form),
-        (axes[1], heard.hanning, ORANGE, "Hanning windows, scaled to the largest line"),
+        (axes[1], band_models.hanning, ORANGE, "Hanning windows, scaled to the largest line"),
     ):
         shown = values > floor
-        ax.vlines(heard.order[shown], floor, values[shown], color=colour, linewidth=2.5, label=text)
+        ax.vlines(band_models.order[shown], floor, values[shown], color=colour, linewidth=2.5, label=text)
         ax.set_yscale("log")
         ax.set_ylim(floor, 12 * top)
         for k in np.argsort(-values, kind="stable")[:5]:
             if values[k] > floor:
-                text = f"{heard.order[k]}"
+                text = f"{band_models.order[k]}"
                 ax.annotate(
                     text,
-                    (heard.order[k], values[k]),
+                    (band_models.order[k], values[k]),
                     xytext=(0, 8),
                     textcoords="offset points",
                     ha="center",
@@ -224,31 +226,31 @@ def _spectrum_figure(speed: str, heard: Heard, teeth: int):
                 )
     label(axes[0], y="acceleration [m/s²]")
     label(axes[1], y="acceleration, scaled [m/s²]")
-    shown = heard.exact > floor
-    if heard.linear is not None:
+    shown = band_models.exact > floor
+    if band_models.linear is not None:
         axes[0].plot(
-            heard.order[shown],
-            heard.exact[shown],
+            band_models.order[shown],
+            band_models.exact[shown],
             "o",
             markerfacecolor="none",
             color=VERMILION,
             label="ring field, exact circumferential Fourier",
         )
-    reach = int(np.abs(heard.order[shown] - centre).max(initial=6)) + 3
+    reach = int(np.abs(band_models.order[shown] - centre).max(initial=6)) + 3
     axes[0].set_xlim(centre - reach, centre + reach)
-    label(axes[0], title=f"{speed}, around mesh harmonic {heard.harmonic} (order {centre})")
+    label(axes[0], title=f"{speed}, around mesh harmonic {band_models.harmonic} (order {centre})")
     label(axes[1], "carrier order [1]")
     legend_below(figure, columns=2)
     return figure
 
 
-def _envelope_figure(speed: str, heard: Heard):
+def _envelope_figure(speed: str, band_models: Heard):
     """Signal and envelope of the band over one carrier revolution, by the ring's field and by windows."""
     from femgear.report.style import BLACK, BLUE, VERMILION, label, legend_below, new_figure
 
     figure, axes = new_figure(rows=2, width=9.5, height=6.4, sharex=True)
     for ax, name, text in ((axes[0], "exact", "ring field"), (axes[1], "Hanning", "Hanning windows")):
-        band = heard.bands[name]
+        band = band_models.bands[name]
         scale = 1.0 / (band.envelope.max() or 1.0)
         at = np.arange(len(band.signal)) / len(band.signal)
         ax.plot(at, scale * band.signal, color=BLUE, linewidth=0.5, label="acceleration of the fixed point")
@@ -259,7 +261,7 @@ def _envelope_figure(speed: str, heard: Heard):
         title = f"{text}: {len(lobes.position)} lobes (largest value {band.envelope.max():.3g}"
         label(ax, y="relative to the largest [1]", title=title + (" m/s²)" if name == "exact" else ", no unit)"))
     axes[0].set_xlim(0, 1)
-    figure.suptitle(f"{speed}, orders {heard.order[0]} to {heard.order[-1]}", fontsize=12)
+    figure.suptitle(f"{speed}, orders {band_models.order[0]} to {band_models.order[-1]}", fontsize=12)
     label(axes[1], "carrier revolutions [1]")
     legend_below(figure)
     return figure
@@ -306,22 +308,22 @@ def ring_surface(planetary_set, radial, tangential, *, columns: int = 360):
     return grid
 
 
-def _export(folder: Path, planetary_set, dynamics, heard: Heard) -> None:
+def _export(folder: Path, planetary_set, dynamics, band_models: Heard) -> None:
     """The ring's deflection as VTU; the polar modulation as VTP and PNG."""
     from femgear.report.scene import write_vtu
     from femgear.storage.files import replaced_file
 
-    shown = slice(0, max(EXPORTED, heard.harmonic) + 1)
+    shown = slice(0, max(EXPORTED, band_models.harmonic) + 1)
     field = dynamics.ring_radial[0, shown], dynamics.ring_tangential[-1, shown]
     surface = ring_surface(planetary_set, *field)
     write_vtu(surface, folder / "ring_deflection.vtu")
     radius = planetary_set.ring.rim_radius
-    envelope = heard.bands["exact"].envelope
+    envelope = band_models.bands["exact"].envelope
     # scaled by the largest value: no part of the curve reaches into the ring
     curve = polar_curve(envelope, radius=1.02 * radius, height=0.4 * radius)
     with replaced_file(folder / "modulation.vtp") as temporary:
         curve.save(temporary, binary=True)
-    _polar_picture(folder / "modulation.png", planetary_set, heard, curve)
+    _polar_picture(folder / "modulation.png", planetary_set, band_models, curve)
 
 
 def polar_curve(values, *, radius: float, height: float):
@@ -339,7 +341,7 @@ def polar_curve(values, *, radius: float, height: float):
     return curve
 
 
-def _polar_picture(path: Path, planetary_set, heard: Heard, curve) -> None:
+def _polar_picture(path: Path, planetary_set, band_models: Heard, curve) -> None:
     """The envelope around the ring over the angle of the carrier, beside that of the Hanning model."""
     from femgear.report.scene import add_text, load_pyvista, look_down, write_png
 
@@ -355,13 +357,13 @@ def _polar_picture(path: Path, planetary_set, heard: Heard, curve) -> None:
             center=centre, inner=planetary_set.planet.rim_radius, c_res=90, outer=planetary_set.planet.reference_radius
         )
         plotter.add_mesh(disc, color="#F0E0B0", lighting=False)
-    windows = heard.bands["Hanning"].envelope
+    windows = band_models.bands["Hanning"].envelope
     other = polar_curve(windows, radius=1.02 * ring.rim_radius, height=0.4 * ring.rim_radius)
     plotter.add_mesh(other, color="#E69F00", line_width=4.0, lighting=False)
     plotter.add_mesh(curve, color="#0072B2", line_width=6.0, lighting=False)
-    lobes = {name: len(band.lobes.position) for name, band in heard.bands.items()}
+    lobes = {name: len(band.lobes.position) for name, band in band_models.bands.items()}
     text = (
-        f"envelope around mesh harmonic {heard.harmonic} over the carrier angle\n"
+        f"envelope around mesh harmonic {band_models.harmonic} over the carrier angle\n"
         f"blue: field of the ring, {lobes['exact']} lobes; orange: Hanning windows, {lobes['Hanning']} lobes"
     )
     add_text(plotter, text, size)

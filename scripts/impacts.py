@@ -262,7 +262,7 @@ def force_amplitudes(kilohertz, curves):
     for number, (text, amplitude, _) in enumerate(curves):
         words = f"{text}: up to {np.nanmax(amplitude):.3g} N"
         ax.plot(kilohertz, amplitude, marker="o", markersize=4, label=words, **line_style(number))
-    mean = np.nanmean([one for *_, one in curves])
+    mean = np.nanmean([force for *_, force in curves])
     ax.axhline(mean, color=BLACK, linewidth=1.0, label=f"mean force {mean:.4g} N: above it teeth part")
     ax.set_ylim(bottom=0.0)
     label(ax, "mesh frequency [kHz]", "amplitude of the force [N]", "sun-planet mesh 1, sun eccentric by E")
@@ -283,7 +283,7 @@ def eccentric_response(eccentricity: float, floating: bool, hertz):
     for value in hertz:
         omega = 2.0 * np.pi * value
         problem = build(omega)
-        found = solve_harmonic_balance(
+        solution = solve_harmonic_balance(
             problem,
             errors.frequency(omega),
             orders=orders,
@@ -291,15 +291,15 @@ def eccentric_response(eccentricity: float, floating: bool, hertz):
             stability=False,
             reduction=reduce_problem(problem),
         )
-        force = element_forces(problem, (wave @ found.deflection.T).real, theta)[0][:, 0]
-        rows.append((0.5 * np.ptp(force), force.mean(), float(found.converged)))
+        force = element_forces(problem, (wave @ solution.deflection.T).real, theta)[0][:, 0]
+        rows.append((0.5 * np.ptp(force), force.mean(), float(solution.converged)))
         if start is None:
             turn = np.linspace(0.0, 1.0, 841)[:-1] * 2.0 * np.pi * errors.teeth["sun"]
-            lines = displacements(problem, found)[6:8]
+            lines = displacements(problem, solution)[6:8]
             phases = np.exp(1j * turn[:, None] * (orders @ errors.frequency(1.0)))
             path = (phases @ lines.T).real.T
-            spectrum = np.abs(orders @ errors.frequency(1.0)), np.abs(found.force[0])
-        start = found if found.converged else None
+            spectrum = np.abs(orders @ errors.frequency(1.0)), np.abs(solution.force[0])
+        start = solution if solution.converged else None
     return np.array(rows).T, path, spectrum
 
 

@@ -87,7 +87,7 @@ def main(
     rows = [
         (
             name,
-            *(f"{one:.2f}" for one in lead),
+            *(f"{value:.2f}" for value in lead),
             f"{factor:.3f}",
             f"{1e6 * maps[name][..., 1].min():.3f} to {1e6 * maps[name][..., 1].max():.3f}",
         )
@@ -121,8 +121,8 @@ def in_slices(case, positions: int):
         a, b, c = (1e-6 * float(amount) for amount in (slope, crowning, relief))
         more = LeadSlope(a), LeadCrowning(b), EndRelief(c, case.set.face_width / 8)
         form = FlankForm((*deviations.sun.modifications, *more))
-        found = replace(basis, deviations=replace(deviations, sun=form))
-        cycle = found.walk(per_input * torque, options=options)
+        changed = replace(basis, deviations=replace(deviations, sun=form))
+        cycle = changed.walk(per_input * torque, options=options)
         assert cycle.face_load_factor is not None
         return float(cycle.face_load_factor[: gears.n_planets].max()), float(cycle.peak_to_peak("sun_arc"))
 
@@ -136,13 +136,13 @@ def design(largest, most: float, progress):
     """
     from scipy.optimize import minimize, minimize_scalar
 
-    known = {}
+    computed = {}
 
     def value(crowning, relief=0.0):
-        if (place := (float(crowning), float(relief))) not in known:
-            known[place] = largest(*place)
-            progress("design", len(known), 35)
-        return known[place]
+        if (place := (float(crowning), float(relief))) not in computed:
+            computed[place] = largest(*place)
+            progress("design", len(computed), 35)
+        return computed[place]
 
     options = {"maxiter": 20, "xatol": 0.01 * most}
     best: Any = minimize_scalar(value, bounds=(0.0, 2.0 * most), method="bounded", options=options)
@@ -161,21 +161,21 @@ def write(folder: Path, maps, torques, slopes, both, length: float) -> None:
     from femgear.storage.files import write_text
 
     rows = (
-        (name, torques[t], 1e-6 * slopes[s], *found[t, s])
-        for name, found in maps.items()
-        for t, s in np.ndindex(found.shape[:2])
+        (name, torques[t], 1e-6 * slopes[s], *values_of_map[t, s])
+        for name, values_of_map in maps.items()
+        for t, s in np.ndindex(values_of_map.shape[:2])
     )
     write_csv(folder / FILES[0], HEADER, ((name, *map(float, row)) for name, *row in rows))
-    shown = {name: found for name, found in maps.items() if name != "crowning"}
+    shown = {name: values_of_map for name, values_of_map in maps.items() if name != "crowning"}
     figure, axes = new_figure(rows=2, columns=len(shown), width=10.5, height=6.4, sharex=True, sharey=True)
     for row, (scale, words) in enumerate(((1.0, "K_Hβ [1]"), (1e6, "STE peak to peak [µm]"))):
-        values = scale * np.array([found[..., row] for found in shown.values()])
-        own, levels = axes[3 * row : 3 * row + 3], MaxNLocator(12).tick_values(values.min(), values.max())
-        for ax, name, one in zip(own, shown, values):
-            filled = ax.contourf(slopes, torques, one, levels=levels, cmap="cividis")
+        values = scale * np.array([values_of_map[..., row] for values_of_map in shown.values()])
+        axes_of_row, levels = axes[3 * row : 3 * row + 3], MaxNLocator(12).tick_values(values.min(), values.max())
+        for ax, name, of_map in zip(axes_of_row, shown, values):
+            filled = ax.contourf(slopes, torques, of_map, levels=levels, cmap="cividis")
             label(ax, "misalignment [µm]" if row else "", title="" if row else name)
-        label(own[0], y="torque [N m]")
-        figure.colorbar(filled, ax=own, label=words)
+        label(axes_of_row[0], y="torque [N m]")
+        figure.colorbar(filled, ax=axes_of_row, label=words)
     save_figure(figure, folder / FILES[1])
     text = f'[[sun.modifications]]\nkind = "lead crowning"\namount = "{both[0]:.3f} um"\n'
     if both[1] > 0.0:

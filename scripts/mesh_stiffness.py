@@ -89,9 +89,10 @@ def _print_summary(torques, results):
     rows = []
     for torque, static in zip(torques, results):
         for name, j in drawn_lines(static["mesh"].values, static["mesh_stiffness"]):
-            k_peak, ste_peak = (static[f"{one}_peak_to_peak"].values[j] for one in ("mesh_stiffness", "ste"))
+            k_peak, ste_peak = (static[f"{variable}_peak_to_peak"].values[j] for variable in ("mesh_stiffness", "ste"))
             k, ste = (
-                factor * float(static[f"{one}_mean"][j]) for one, factor in (("mesh_stiffness", 1e-6), ("ste", 1e6))
+                factor * float(static[f"{variable}_mean"][j])
+                for variable, factor in (("mesh_stiffness", 1e-6), ("ste", 1e6))
             )
             values = (k, k_peak / 1e6, ste, ste_peak * 1e6)
             per_width = k / (1e3 * static.attrs["face_width"])

@@ -37,21 +37,21 @@ def main(*, output: Annotated[Path, Parameter(name=("--output", "-o"))] = Path("
         for planets in (3, 4):
             for held in (False, True):
                 case = published_case(planets=planets, stiffness_unit=factor, held=held)
-                found = solve(case, only="modes")["modes"].modes.frequency
-                elastic, reading = found[found > 0.0], f"{unit}, {planets} planets"
+                frequencies = solve(case, only="modes")["modes"].modes.frequency
+                elastic, reading = frequencies[frequencies > 0.0], f"{unit}, {planets} planets"
                 end = "last carrier held" if held else "last carrier free"
                 inside = int(np.sum((elastic > low) & (elastic < high)))
                 rows.append(
                     (
                         reading,
                         end,
-                        str(len(found) - len(elastic)),
+                        str(len(frequencies) - len(elastic)),
                         f"{elastic[0]:.1f}",
                         f"{elastic[-1]:.1f}",
                         f"{inside} of {len(elastic)}",
                     )
                 )
-                records += [(unit, planets, end, number + 1, float(f)) for number, f in enumerate(found)]
+                records += [(unit, planets, end, number + 1, float(f)) for number, f in enumerate(frequencies)]
                 ladders.append((f"{reading}\n{end}", elastic))
     write_csv(folder / "published.csv", ("unit", "planets", "end", "mode", "frequency [Hz]"), records)
     figure, (ax,) = new_figure(width=8.5, height=4.8)

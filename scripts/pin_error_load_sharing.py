@@ -91,8 +91,8 @@ def main(
         results = []
         for kind in dict.fromkeys(support):
             progress(kind, 0, 1)
-            pins, *found = _solve(data, basis, kind, torque, place, sigma, samples, seed)
-            results.append((kind, *found))
+            pins, *results_of_kind = _solve(data, basis, kind, torque, place, sigma, samples, seed)
+            results.append((kind, *results_of_kind))
             progress(kind, 1, 1)
     names = {"fixed": "all members fixed", "floating": "floating sun", "case": "supports of the case"}
     _print_summary(results, names, pins, sigma, seed)
@@ -229,9 +229,9 @@ def _print_sensitivities(results, names, sigma):
     rows = []
     for kind, sharing, facts in results:
         slopes = facts["sensitivity"]
-        own = slopes[np.arange(len(slopes)), np.arange(len(slopes))]
+        own_pin = slopes[np.arange(len(slopes)), np.arange(len(slopes))]
         others = slopes[~np.eye(len(slopes), dtype=bool)]
-        mean = [own[:, 1].mean(), own[:, 0].mean()]
+        mean = [own_pin[:, 1].mean(), own_pin[:, 0].mean()]
         mean += [others[:, 1].mean(), others[:, 0].mean()] if len(others) else [0.0, 0.0]
         spread = np.sqrt(((slopes * sigma) ** 2).sum(axis=(1, 2))).mean(), sharing.share.std(axis=0).mean()
         values = [f"{round(1e-4 * m, 4) + 0.0:+.4f}" for m in mean] + [f"{100 * s:.3f}" for s in spread]

@@ -172,10 +172,10 @@ def _types(convention, harmonics):
 
     from femgear.gears.phasing import MeshPhasing, phasing_table
 
-    found = cases(convention=convention)
-    sets = {_title(name, letter): found[letter] for name, letter in TYPES.items()}
+    phasing_by_case = cases(convention=convention)
+    sets = {_title(name, letter): phasing_by_case[letter] for name, letter in TYPES.items()}
     sets["unequal pairs: 30/21/72"] = MeshPhasing(30, 72, (0, 21, 51, 72), convention=convention)
-    return {title: phasing_table(one, range(1, harmonics + 1)) for title, one in sets.items()}
+    return {title: phasing_table(phasing, range(1, harmonics + 1)) for title, phasing in sets.items()}
 
 
 def _title(name: str, letter: str) -> str:
@@ -198,12 +198,12 @@ def _spectra(points):
     last, turning = TYPES["sequentially phased"], cases()
     sets = {_title(name, letter): turning[letter] for name, letter in TYPES.items()}
     sets[f"{_title('sequentially phased', last)}, phases as printed"] = cases(convention="printed")[last]
-    found = []
+    force_by_harmonic = []
     for h in (1, 2, 3, 4):
-        error = 1e-6 * np.array([phase_factors(one, [h]).T for one in sets.values()])
-        one = modal_error_response(modes, frequency / h, error, harmonics=[h])
-        found.append(np.abs(one.force[:, :, 0, :2]))
-    forces = {title: np.array([force[c] for force in found]) for c, title in enumerate(sets)}
+        error = 1e-6 * np.array([phase_factors(phasing, [h]).T for phasing in sets.values()])
+        response = modal_error_response(modes, frequency / h, error, harmonics=[h])
+        force_by_harmonic.append(np.abs(response.force[:, :, 0, :2]))
+    forces = {title: np.array([force[c] for force in force_by_harmonic]) for c, title in enumerate(sets)}
     kinds, inside = np.array(modes.kind), (modes.frequency > 0.0) & (modes.frequency < frequency[-1])
     names = {"rotational": "rotational-axial", "translational": "translational-tilting", "planet": "planet"}
     marks = {short: modes.frequency[inside & (kinds == kind)] for short, kind in names.items()}

@@ -340,7 +340,7 @@ def main(
     shown = {path.read_bytes(): path for path in sorted(images.glob("*/*.png"))}
     shown = {data: path for data, path in shown.items() if path.parent.name not in (only or RUNS)}
     for name in only or RUNS:
-        place, found = images / name, []
+        place, pictures = images / name, []
         place.mkdir(parents=True, exist_ok=True)
         for source in _pictures(output / name):
             if not source.name.startswith(RUNS[name].shows):
@@ -350,9 +350,9 @@ def main(
                 continue
             shown[data] = place / source.name
             write_bytes(data, place / source.name)
-            found.append((source.stem, f"images/{name}/{source.name}"))
-        _remove(place, {Path(link).name for _, link in found})
-        sections[RUNS[name].title] = _section(RUNS[name], output / name, found)
+            pictures.append((source.stem, f"images/{name}/{source.name}"))
+        _remove(place, {Path(link).name for _, link in pictures})
+        sections[RUNS[name].title] = _section(RUNS[name], output / name, pictures)
     texts = [sections[run.title] for run in RUNS.values() if run.title in sections]
     write_text("\n".join([HEAD, *texts]), page)
     print(f"{len(shown)} pictures, {sum(map(len, shown)) / 1e6:.2f} MB, in {images}")
@@ -419,18 +419,18 @@ def small(source: Path) -> bytes:
     raise StorageError(f"{source.name} takes {len(data)} bytes", code="E-RANGE", limit=f"{LARGEST} bytes")
 
 
-def _section(run: Run, folder: Path, found: list[tuple[str, str]]) -> str:
+def _section(run: Run, folder: Path, pictures: list[tuple[str, str]]) -> str:
     """The part of the page that shows a run."""
     lines = [f"## {run.title}", ""]
     if run.entry is not None:
         old, new = (text.strip() for text in run.entry)
         lines += [f"In the case file `{old}` becomes", "", "```toml", new, "```", ""]
     lines += [f"`{run.command} -o out/{folder.name}`", ""]
-    for stem, link in found:
+    for stem, link in pictures:
         words = _sentence(run, stem)
         # the text of a picture names it; what it shows stands below, for all readers
         lines += [f"![{run.title}: {stem.replace('_', ' ')}]({link})", "", f"*{words}*", ""]
-    if not found:
+    if not pictures:
         lines += ["Its pictures stand above.", ""]
     return "\n".join(lines)
 

@@ -103,7 +103,7 @@ def main(
     half_width
         Carrier orders drawn on either side of each.
     """
-    known, ratio = _gear_set(case, ring, sun, planet, angle)
+    gear_set, ratio = _gear_set(case, ring, sun, planet, angle)
     if not (1 <= harmonics <= 12 and 1 <= half_width <= 60 and -200 <= threshold < 0):
         raise CaseError(
             "no such picture",
@@ -111,33 +111,33 @@ def main(
             value=(harmonics, half_width, threshold),
             limit="1 to 12 harmonics, 1 to 60 orders on either side, a threshold of -200 dB up to below 0",
         )
-    rows, order, level, found = [], np.zeros(0), np.zeros(0), ()
+    rows, order, level, verdicts = [], np.zeros(0), np.zeros(0), ()
     if spectrum is not None:
         measured = _read(spectrum, channel)
         order = _orders(measured, speed, ratio, spectrum)
         amplitude, step = measured.amplitude, float(np.median(np.diff(order)))
-        own = max(0.5 * step, FINEST) if step < 0.5 else FINEST
-        within = _checked_tolerance(own if tolerance is None else tolerance, step)
+        finest = max(0.5 * step, FINEST) if step < 0.5 else FINEST
+        within = _checked_tolerance(finest if tolerance is None else tolerance, step)
         lines = find_lines(order, amplitude, threshold=threshold)
         order, level = order[lines], 20 * np.log10(amplitude[lines] / amplitude[lines].max(initial=0.0))
-        found = classify_lines(order.tolist(), known.angles, known.teeth, tolerance=within)
+        verdicts = classify_lines(order.tolist(), gear_set.angles, gear_set.teeth, tolerance=within)
         rows = [
-            (float(o), float(v), one.nearest, one.factor, one.verdict, one.reason)
-            for o, v, one in zip(order, level, found)
+            (float(o), float(v), verdict.nearest, verdict.factor, verdict.verdict, verdict.reason)
+            for o, v, verdict in zip(order, level, verdicts)
         ]
-    elif any(one is not None for one in (speed, channel, tolerance)):
+    elif any(option is not None for option in (speed, channel, tolerance)):
         message, remedy = "speed, channel and tolerance belong to a spectrum", "give --spectrum FILE"
         raise CaseError(message, code="E-CHOICE", key="--spectrum", remedy=remedy)
     files = (PICTURE, FACTORS, LINES) if spectrum else (PICTURE, FACTORS)
     folder = ready_folder(output, files)
-    _print_set(known)
-    _write_factors(folder / FACTORS, known, harmonics, half_width)
+    _print_set(gear_set)
+    _write_factors(folder / FACTORS, gear_set, harmonics, half_width)
     if spectrum is not None:
         write_csv(folder / LINES, HEADER, rows)
-        _print_lines(measured.name, rows, threshold, within, known, {one.part for one in found})
+        _print_lines(measured.name, rows, threshold, within, gear_set, {verdict.part for verdict in verdicts})
     lines_of = {word: [(row[0], row[1]) for row in rows if row[4] == word] for word in (NORMAL, UNEQUAL, FOREIGN)}
     drawn = {"threshold": threshold, "harmonics": range(1, harmonics + 1), "half_width": half_width}
-    save_figure(draw_side_bands(known, lines_of if rows else {}, **drawn), folder / PICTURE)
+    save_figure(draw_side_bands(gear_set, lines_of if rows else {}, **drawn), folder / PICTURE)
     say_files(folder, files)
 
 
@@ -152,9 +152,9 @@ def _gear_set(case, ring, sun, planet, angle) -> tuple[HeardSet, float]:
         if case is not None or not angle:
             message, limit = "a set without case file", "no CASE; --ring with an --angle for every planet"
             raise CaseError(message, code="E-CHOICE", key="--ring", value=ring, limit=limit)
-        teeth = [one for one in (ring, sun, planet) if one is not None]
+        teeth = [count for count in (ring, sun, planet) if count is not None]
         apart = np.diff(np.sort(np.mod(angle, 360.0))) if np.isfinite(angle).all() else [0.0]
-        if not all(5 <= one <= 2000 for one in teeth) or min(apart, default=1.0) < 0.1:
+        if not all(5 <= count <= 2000 for count in teeth) or min(apart, default=1.0) < 0.1:
             raise CaseError(
                 "teeth or angles of a set",
                 code="E-RANGE",
@@ -162,26 +162,26 @@ def _gear_set(case, ring, sun, planet, angle) -> tuple[HeardSet, float]:
                 limit="5 to 2000 teeth, planets at different finite angles",
             )
         return HeardSet(ring, sun, planet, np.radians(angle)), 1.0
-    known = heard_set(read_case(case or REFERENCE_CASE))
-    return known, known.carrier_per_turn[known.input]
+    gear_set = heard_set(read_case(case or REFERENCE_CASE))
+    return gear_set, gear_set.carrier_per_turn[gear_set.input]
 
 
 def _read(path: Path, channel: str | None) -> Measured:
     """The spectrum of a file, checked."""
     kind = path.suffix.lower()
-    found = _read_universal(path, channel) if kind in (".uff", ".unv") else _read_csv(path, channel)
-    if not found.amplitude[found.abscissa > 0].max(initial=0.0) > 0:
+    spectrum_read = _read_universal(path, channel) if kind in (".uff", ".unv") else _read_csv(path, channel)
+    if not spectrum_read.amplitude[spectrum_read.abscissa > 0].max(initial=0.0) > 0:
         message, limit = "the spectrum is silent", "one amplitude above zero or more, not at rest"
         raise CaseError(message, code="E-FILE", file=str(path), limit=limit)
-    return found
+    return spectrum_read
 
 
 def _read_csv(path: Path, channel: str | None) -> Measured:
     from femgear.case.text import read_text
 
-    lines = [(i, one) for i, one in enumerate(read_text(path).splitlines(), 1) if one.strip()]
+    lines = [(i, row_text) for i, row_text in enumerate(read_text(path).splitlines(), 1) if row_text.strip()]
     # spreadsheets write "sep=;" above the heading of files with decimal commas
-    lines = [(i, one) for i, one in lines if not one.lstrip().lower().startswith(("#", "sep="))]
+    lines = [(i, row_text) for i, row_text in lines if not row_text.lstrip().lower().startswith(("#", "sep="))]
 
     def problem(message: str, line: int, value=None, limit=None, remedy: str = REMEDY) -> CaseError:
         where = {"file": f"{path}:{line}", "value": value, "limit": limit, "remedy": remedy}
@@ -190,7 +190,7 @@ def _read_csv(path: Path, channel: str | None) -> Measured:
     if len(lines) < 3:
         raise problem(f"{max(len(lines) - 1, 0)} lines of a spectrum", 1, limit="a heading and two lines or more")
     divider = next((mark for mark in ";\t" if mark in lines[0][1]), ",")
-    (first, heading), *table = [(i, next(csv.reader([one], delimiter=divider))) for i, one in lines]
+    (first, heading), *table = [(i, next(csv.reader([row_text], delimiter=divider))) for i, row_text in lines]
     names = [[*re.split(r"[\[(]", cell.strip(), maxsplit=1), ""] for cell in heading]
     names = [(name.strip().lower(), unit.rstrip(")] ").strip()) for name, unit, *_ in names]
     title = ", ".join(heading)
@@ -210,7 +210,7 @@ def _read_csv(path: Path, channel: str | None) -> Measured:
     for i, cells in table:
         try:
             texts = [cells[axis[0]], cells[chosen[0]]]
-            pair = [float(one.replace(",", ".") if divider != "," else one) for one in texts]
+            pair = [float(text.replace(",", ".") if divider != "," else text) for text in texts]
         except (ValueError, IndexError):
             pair = [math.nan]
         if len(cells) != len(names) or not all(map(math.isfinite, pair)):
@@ -239,7 +239,9 @@ def _read_universal(path: Path, channel: str | None) -> Measured:
     if len(every) > 1:  # a signal may have the name of its spectrum
         spectra = [function for function in every if function.kind in KNOWN]
     if len(spectra) != 1:
-        listed = "; ".join(f"{one.name} (dataset {one.number}, type {one.kind})" for one in spectra or every)
+        listed = "; ".join(
+            f"{dataset.name} (dataset {dataset.number}, type {dataset.kind})" for dataset in spectra or every
+        )
         raise problem(
             f"{len(spectra)} spectra in the file",
             value=listed[:600] or None,
@@ -303,23 +305,23 @@ def _checked_tolerance(tolerance: float, step: float) -> float:
     return tolerance
 
 
-def _print_set(known: HeardSet) -> None:
-    g, angles = spacing_symmetry(known.angles), ", ".join(f"{math.degrees(one):.5g}" for one in known.angles)
+def _print_set(gear_set: HeardSet) -> None:
+    g, angles = spacing_symmetry(gear_set.angles), ", ".join(f"{math.degrees(angle):.5g}" for angle in gear_set.angles)
     rule = f"planets that are alike make only multiples of {g}" if g > 1 else "no order is forbidden"
-    print(f"{known.ring} ring teeth, planets at {angles} deg: {rule}")
+    print(f"{gear_set.ring} ring teeth, planets at {angles} deg: {rule}")
 
 
-def _write_factors(path: Path, known: HeardSet, harmonics: int, half_width: int) -> None:
-    g, rows = spacing_symmetry(known.angles), []
+def _write_factors(path: Path, gear_set: HeardSet, harmonics: int, half_width: int) -> None:
+    g, rows = spacing_symmetry(gear_set.angles), []
     for h in range(1, harmonics + 1):
-        orders = np.arange(max(h * known.ring - half_width, 1), h * known.ring + half_width + 1)
-        for order, factor in zip(orders.tolist(), array_factor(known.angles, orders).tolist()):
+        orders = np.arange(max(h * gear_set.ring - half_width, 1), h * gear_set.ring + half_width + 1)
+        for order, factor in zip(orders.tolist(), array_factor(gear_set.angles, orders).tolist()):
             rows.append((h, order, factor, "forbidden" if order % g else ""))
     write_csv(path, ("mesh harmonic", "carrier order", "array factor", "symmetry"), rows)
 
 
 def _print_lines(
-    name: str, rows, threshold: float, tolerance: float, known: HeardSet, heard_parts: Collection[str]
+    name: str, rows, threshold: float, tolerance: float, gear_set: HeardSet, heard_parts: Collection[str]
 ) -> None:
     strongest = sorted(sorted(rows, key=lambda row: -row[1])[:SHOWN])
     shown = [(f"{o:.7g}", f"{v:.1f}", f"{n}", f"{f:.3f}", *words) for o, v, n, f, *words in strongest]
@@ -327,8 +329,8 @@ def _print_lines(
     print_table(title + (f", the strongest {SHOWN}" if len(rows) > SHOWN else ""), HEADER, shown)
     counts = ((word, sum(row[4] == word for row in rows)) for word in (NORMAL, UNEQUAL, FOREIGN))
     print(", ".join(f"{count} {word}" for word, count in counts))
-    if any(known.teeth[1:]):
-        likely = chance(tolerance, known.teeth, spacing_symmetry(known.angles), heard_parts)
+    if any(gear_set.teeth[1:]):
+        likely = chance(tolerance, gear_set.teeth, spacing_symmetry(gear_set.angles), heard_parts)
         print(f"an order without meaning fits turns of sun or planet by chance in {likely:.0%} of cases at most")
 
 

@@ -65,7 +65,13 @@ def main(
     whole = {name: np.sqrt((values**2).mean(axis=0)) for name, values in levels.items()}
     plain = next(iter(whole.values()))
     rows = [
-        (name, *(f"{value:.1f} ({20.0 * math.log10(value / own):+.1f} dB)" for value, own in zip(values, plain)))
+        (
+            name,
+            *(
+                f"{value:.1f} ({20.0 * math.log10(value / reference):+.1f} dB)"
+                for value, reference in zip(values, plain)
+            ),
+        )
         for name, values in whole.items()
     ]
     print_table("Root mean square over all speeds [m/s^2]", ("variant", *sensors), rows)

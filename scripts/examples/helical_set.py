@@ -15,11 +15,11 @@ from femgear import read_case, solve
 
 plt.style.use("tableau-colorblind10")
 case = read_case(Path(__file__).parents[2] / "cases" / "helical_30_20_70.toml")
-found = solve(case, "dynamics")["dynamics"].dataset().sel(axis="z")
-thrust = np.abs(found.support_force_real + 1j * found.support_force_imag)  # speed, member, harmonic
+dynamics = solve(case, "dynamics")["dynamics"].dataset().sel(axis="z")
+thrust = np.abs(dynamics.support_force_real + 1j * dynamics.support_force_imag)  # speed, member, harmonic
 for harmonic in range(4):
     largest = thrust.sel(harmonic=harmonic).max("speed")
-    words = (f"{name} {one:.1f} N" for name, one in zip(thrust.member.values, largest.values))
+    words = (f"{name} {force:.1f} N" for name, force in zip(thrust.member.values, largest.values))
     print(f"harmonic {harmonic}:", ", ".join(words))
 
 # %%
@@ -27,7 +27,7 @@ for harmonic in range(4):
 
 figure, ax = plt.subplots(layout="constrained")
 for member, style in zip(thrust.member.values, ("-", "--", "-.")):
-    ax.semilogy(found.speed, thrust.sel(member=member, harmonic=2), style, label=member)
+    ax.semilogy(dynamics.speed, thrust.sel(member=member, harmonic=2), style, label=member)
 ax.set(xlabel="speed of the sun [rpm]", ylabel="axial force of mesh harmonic 2 [N]")
 ax.legend()
 plt.show()

@@ -15,14 +15,14 @@ from femgear import read_case, solve
 
 plt.style.use("tableau-colorblind10")
 case = read_case(Path(__file__).parents[2] / "cases" / "spur_pair.toml")
-found = solve(case, "stress")
-static, stress = found["static"].dataset().isel(mesh=0), found["stress"].dataset().isel(mesh=0)
+results = solve(case, "stress")
+static, stress = results["static"].dataset().isel(mesh=0), results["stress"].dataset().isel(mesh=0)
 
 # %%
 # Tooth pairs that carry at each of the 64 positions, and the share of the cycle with two of them.
 
 pairs = (static.tooth_load > 0).sum("tooth")
-print(f"contact ratio: rigid {found['static'].planetary_set.contact_ratio:.3f}, ", end="")
+print(f"contact ratio: rigid {results['static'].planetary_set.contact_ratio:.3f}, ", end="")
 print(f"under load {float(stress.loaded_contact_ratio):.3f}")
 
 figure, (above, below) = plt.subplots(2, sharex=True, layout="constrained")

@@ -19,17 +19,17 @@ case = read_case(Path(__file__).parents[2] / "cases" / "spur_pair.toml")
 basis = replace(design_basis(case), positions=12)
 torques, reliefs = np.linspace(50, 350, 7), np.linspace(0, 30e-6, 7)
 variants = [with_tip_relief(None, basis.gears, amount=amount) for amount in reliefs]
-found = 1e6 * harris_map(basis, torques=torques, deviations=variants).peak_to_peak[:, 0]
+errors = 1e6 * harris_map(basis, torques=torques, deviations=variants).peak_to_peak[:, 0]
 
 # %%
 # The quietest relief of every torque.
 
-best = found.argmin(axis=0)
+best = errors.argmin(axis=0)
 for torque, row in zip(torques, best):
     print(f"{torque:4.0f} N m: {1e6 * reliefs[row]:2.0f} um")
 
 figure, ax = plt.subplots(layout="constrained")
-filled = ax.contourf(torques, 1e6 * reliefs, found, levels=12, cmap="cividis")
+filled = ax.contourf(torques, 1e6 * reliefs, errors, levels=12, cmap="cividis")
 ax.plot(torques, 1e6 * reliefs[best], "wo-", label="least of every torque")
 ax.set(xlabel="torque of gear 1 [N m]", ylabel="tip relief of both gears [µm]")
 figure.colorbar(filled, label="transmission error, peak to peak [µm]")

@@ -26,7 +26,7 @@ figure, ax = plt.subplots(layout="constrained")
 # One curve a shape: power 1 is a straight line over the roll length, power 2 a parabola.
 
 for shape, power, style in (("linear", 1.0, "o-"), ("parabolic", 2.0, "s--")):
-    variants = [with_tip_relief(None, basis.gears, amount=one, power=power) for one in amounts]
+    variants = [with_tip_relief(None, basis.gears, amount=most, power=power) for most in amounts]
     error = 1e6 * harris_map(basis, torques=[torque], deviations=variants).peak_to_peak[:, 0, 0]
     ax.plot(1e6 * amounts, error, style, label=shape)
     print(f"{shape}: {error.min():.2f} um at {1e6 * amounts[error.argmin()]:g} um")

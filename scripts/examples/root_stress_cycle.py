@@ -21,10 +21,10 @@ stress = solve(with_value(case, "static.positions", 32), "stress")["stress"].dat
 
 figure, ax = plt.subplots(layout="constrained")
 for gear, style in ((0, "-"), (1, "--")):
-    one = stress.isel(gear=gear)
-    ax.plot(one.root_path, 1e-6 * one.root_tension, style, label=f"gear {gear + 1}")
-    nominal = 1e-6 * float(one.iso_root_stress)
-    print(f"gear {gear + 1}: {1e-6 * float(one.root_tension.max()):.0f} MPa, ISO 6336-3 {nominal:.0f} MPa")
+    of_gear = stress.isel(gear=gear)
+    ax.plot(of_gear.root_path, 1e-6 * of_gear.root_tension, style, label=f"gear {gear + 1}")
+    nominal = 1e-6 * float(of_gear.iso_root_stress)
+    print(f"gear {gear + 1}: {1e-6 * float(of_gear.root_tension.max()):.0f} MPa, ISO 6336-3 {nominal:.0f} MPa")
 
 ax.set(xlabel="place on the path of contact [base pitches]", ylabel="largest tension in the root [MPa]")
 ax.legend()

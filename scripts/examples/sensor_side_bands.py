@@ -26,10 +26,10 @@ lines = stored_lines(solve(case, "housing")["housing"].dataset().isel(speed=1))
 # Orders around the fifth mesh harmonic of the ring with 108 teeth at 3100 rpm, and what the spacing allows.
 
 near = np.abs(lines.order - 5 * 108) <= 12
-orders, heard = lines.order[near], np.abs(lines.acceleration[near])
-print("allowed and heard:", orders[heard > 1e-3 * heard.max()].tolist())
+orders, amplitudes = lines.order[near], np.abs(lines.acceleration[near])
+print("allowed and heard:", orders[amplitudes > 1e-3 * amplitudes.max()].tolist())
 figure, (above, below) = plt.subplots(2, sharex=True, layout="constrained")
-above.bar(orders, heard, width=0.4)
+above.bar(orders, amplitudes, width=0.4)
 above.set(ylabel="acceleration [m/s²]")
 every = np.arange(528, 553)
 below.bar(every, array_factor(equal_planet_angles(3), every), width=0.4, color="C1")

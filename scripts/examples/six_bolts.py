@@ -25,9 +25,9 @@ figure, ax = plt.subplots(layout="constrained")
 # The level at the sensor over the speed of the sun, by four mesh harmonics.
 
 for name, change, style in (("foundation alone", {}, "-"), ("six bolts", bolts, "--")):
-    found = solve(with_values(case, change), "housing")["housing"].dataset()
-    ax.plot(found.speed, found.level, style, label=name)
-    print(f"{name}: up to {float(found.level.max()):.1f} m/s^2")
+    housing = solve(with_values(case, change), "housing")["housing"].dataset()
+    ax.plot(housing.speed, housing.level, style, label=name)
+    print(f"{name}: up to {float(housing.level.max()):.1f} m/s^2")
 
 ax.set(xlabel="speed of the sun [rpm]", ylabel="acceleration, r.m.s. [m/s²]", ylim=(0, None))
 ax.legend()

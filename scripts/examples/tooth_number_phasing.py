@@ -18,13 +18,13 @@ kinds = ["rotational", "translational", "planet"]
 table = np.zeros((len(suns), len(harmonics)), int)
 for row, sun in enumerate(suns):
     ring = 100 - sun  # divisible by the number of planets together: the set can be assembled
-    found = phasing_table(mesh_phasing(sun, ring, equal_planet_angles(planets)), harmonics)
-    table[row] = [kinds.index(one[0]) for one in found.excited]
+    phases_of_set = phasing_table(mesh_phasing(sun, ring, equal_planet_angles(planets)), harmonics)
+    table[row] = [kinds.index(names[0]) for names in phases_of_set.excited]
 
 # %%
 # Sun and ring have 100 teeth together; a row tells which kind of mode every mesh harmonic drives.
 
-print(f"sun of 27: harmonics 1 to 4 drive {[kinds[one] for one in table[3, :4]]}")
+print(f"sun of 27: harmonics 1 to 4 drive {[kinds[kind] for kind in table[3, :4]]}")
 colours, norm = ListedColormap(["#D55E00", "#56B4E9", "#DDDDDD"]), BoundaryNorm([-0.5, 0.5, 1.5, 2.5], 3)
 figure, ax = plt.subplots(layout="constrained")
 drawn = ax.pcolormesh(harmonics, suns, table, cmap=colours, norm=norm, edgecolor="white")

@@ -19,8 +19,8 @@ case = read_case(Path(__file__).parents[2] / "cases" / "nrel_pgb.toml")
 plays, touching = np.arange(0.04, 0.13, 0.01), []
 for play in plays:
     changed = with_values(case, {"set.backlash": f"{play:.3f} mm", "operation.speeds": ["30 rpm"]})
-    found = solve(changed, "response")["response"].dataset().isel(speed=0)
-    touching.append([float(found.back_contact[:3].max()), float(found.back_contact[3:].max())])
+    response = solve(changed, "response")["response"].dataset().isel(speed=0)
+    touching.append([float(response.back_contact[:3].max()), float(response.back_contact[3:].max())])
 
 # %%
 # The share of a turn in which back flanks touch, of the mesh where they do so longest.

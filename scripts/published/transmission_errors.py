@@ -250,12 +250,12 @@ def with_errors(
         Back flanks on their own lines, stepwise series (E-RANGE), dampers without a frequency (E-RANGE).
     """
     drive, *others = problem.elements
-    known = drive.state[0] if isinstance(drive, GearMeshes) else None
-    several = any(isinstance(one, GearMeshes) for one in others)
+    stiffness = drive.state[0] if isinstance(drive, GearMeshes) else None
+    several = any(isinstance(element, GearMeshes) for element in others)
     if (
         not isinstance(drive, GearMeshes)
-        or known is None
-        or isinstance(known, StepSeries)
+        or stiffness is None
+        or isinstance(stiffness, StepSeries)
         or several
         or len(drive.columns) != 2 * errors.data.n_planets
     ):
@@ -265,7 +265,7 @@ def with_errors(
             remedy="build the problem with gear_set_problem, without back flanks on their own lines",
         )
     series = errors.series
-    parts = known.parts if isinstance(known, SummedSeries) else (known,)
+    parts = stiffness.parts if isinstance(stiffness, SummedSeries) else (stiffness,)
     elements = (replace(drive, deflection=SummedSeries((*parts, *series.parts))), *others)
     forces = problem.forces
     if dampers is not None:

@@ -315,4 +315,4 @@ def varied(name: str, factor: float) -> Assumed:
 
 def assumption_names() -> tuple[str, ...]:
     """Names of the assumed numbers."""
-    return tuple(one.name for one in fields(Assumed))
+    return tuple(entry.name for entry in fields(Assumed))

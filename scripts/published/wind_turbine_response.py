@@ -77,7 +77,7 @@ def member_lines(problem: NonlinearSystem, solutions: Sequence[PeriodicSolution]
     reduction, outputs = drive_reduction(problem), np.zeros((2, len(problem.system.M)))
     first = 3 * CENTRAL.index(member)
     outputs[[0, 1], [first, first + 1]] = 1.0
-    return np.array([displacements(problem, one, outputs, reduction=reduction) for one in solutions])
+    return np.array([displacements(problem, solution, outputs, reduction=reduction) for solution in solutions])
 
 
 def member_rms(problem: NonlinearSystem, solutions: Sequence[PeriodicSolution], member: str) -> np.ndarray:
@@ -157,7 +157,7 @@ def wedging_map(
         start = None
         for j, play in enumerate(clearance):
             problem = bearing_problem_a(play, backlash=backlash, smoothing=smoothing)
-            found = solve_harmonic_balance(
+            solution = solve_harmonic_balance(
                 problem,
                 2.0 * np.pi * hertz,
                 harmonics=harmonics,
@@ -166,14 +166,14 @@ def wedging_map(
                 reduction=drive_reduction(problem),
                 stability=False,
             )
-            start = found if found.converged else None
-            if found.converged:
-                states[i, j] = contact_shares(problem, found)[:12].reshape(2, 6)
+            start = solution if solution.converged else None
+            if solution.converged:
+                states[i, j] = contact_shares(problem, solution)[:12].reshape(2, 6)
     return WedgingMap(np.array(frequency), np.array(clearance), states[:, :, 0], states[:, :, 1])
 
 
-def wedging_onset(found: WedgingMap) -> np.ndarray:
+def wedging_onset(contact: WedgingMap) -> np.ndarray:
     """Smallest clearance (f,) [m] at which a back flank touches; nan where none does."""
-    touching = found.back.max(axis=2) > 0.0
+    touching = contact.back.max(axis=2) > 0.0
     first = touching.argmax(axis=1)
-    return np.where(touching.any(axis=1), found.clearance[first], np.nan)
+    return np.where(touching.any(axis=1), contact.clearance[first], np.nan)
