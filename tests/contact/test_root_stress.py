@@ -12,6 +12,7 @@ from femgear.contact.cycle import CycleOptions, walk_mesh_cycle
 from femgear.contact.root_stress import (
     BACK,
     LOADED,
+    RootCycle,
     _between_slices,
     computed_waves,
     observed_root_stress,
@@ -413,6 +414,14 @@ def test_fields_without_a_position_are_those_of_the_first(loaded):
     default, first = (deformed_set(gears, sectors, cycle, **given) for given in ({}, {"position": 0}))
     for one, other in zip(default, first, strict=True):
         assert one.name == other.name and np.array_equal(one.displacement, other.displacement)
+
+
+def test_a_tooth_is_in_the_next_slot_one_period_later():
+    """Three slots, four mesh periods of two positions: one that enters in the third period ends in the first."""
+    number = 100.0 * np.arange(3)[:, None] + np.arange(8)
+    over = number[..., None]
+    root = RootCycle("sun", 0, 0, number, number, over[..., None] * np.ones((2, 1)), over[0, 0], over[0, 0], 4, over)
+    assert root.history(2).load.tolist() == [4.0, 5.0, 106.0, 107.0, 200.0, 201.0]
 
 
 def test_history_of_a_tooth(loaded):
