@@ -249,6 +249,9 @@ def judge_strength(
     """
     findings = list(findings)
     beyond = _raised(findings, _BEYOND)
+    if any(finding.code == "W-EDGE" and ".fault[" in finding.key for finding in findings):
+        # the pressure at the sharp edge of a pit or a broken tooth is that of the grid
+        beyond, doubts = [code for code in beyond if code != "W-PRESSURE"], (*doubts, "W-EDGE")
     rated = [
         (symbol, least, required)
         for symbol, least, required in (

@@ -86,6 +86,7 @@ def test_safeties_of_faulty_teeth_deserve_a_look():
     fault = Finding("W-FAULT", "planet.fault[0]", "text", severity=DOUBT)
     part = judge_strength(ROOT, FLANK, StrengthSection(), "", [fault], OF_ROOTS)
     assert part.state == "look" and "effects of a fault left out" in part.limit
+    assert part.sentence.startswith("But for the faulty teeth strong enough: ")
 
 
 def test_what_no_steel_carries_fails_whatever_its_safeties():
@@ -95,6 +96,14 @@ def test_what_no_steel_carries_fails_whatever_its_safeties():
     assert (unrated.state, unrated.answer) == ("bad", "root 900 MPa")
     # the code with its meaning
     assert unrated.limit == "pressure beyond any steel (W-PRESSURE)"
+
+
+def test_the_pressure_at_the_sharp_edge_of_a_pit_is_that_of_the_grid():
+    pressure = Finding("W-PRESSURE", "", "text", severity=FAULT)
+    for key, state in (("planet.fault[0]", "look"), ("", "bad")):
+        findings = [pressure, Finding("W-EDGE", key, "text")]
+        judged = judge_strength(ROOT, FLANK, StrengthSection(), "", findings, OF_ROOTS)
+        assert judged.state == state and ("contact at the end of a flank" in judged.limit) == (state == "look")
 
 
 def test_the_safety_over_the_life_counts_where_it_is_smaller():
