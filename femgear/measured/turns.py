@@ -14,6 +14,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -230,7 +231,7 @@ def curvature_penalty(values: np.ndarray, spacing: float = 1.0) -> float:
     difference = -4.0 * np.sin(0.5 * np.pi * number / (n - 1)) ** 2
     gram, squared = 1.0 + difference / 6.0, difference**2
     end = 2.0 / math.sqrt(n - 1) * np.sin(np.pi * number / (n - 1))
-    bent = dst(np.diff(values, 2), type=1, norm="ortho")
+    bent = np.asarray(dst(np.diff(values, 2), type=1, norm="ortho"))
 
     def validation(penalty: float) -> float:
         a = penalty / spacing**3
@@ -244,7 +245,8 @@ def curvature_penalty(values: np.ndarray, spacing: float = 1.0) -> float:
             missed += (squared[waves] * curvature**2).sum() + (ends * curvature).sum() ** 2
         return a**2 * missed * n / left**2
 
-    return float(minimize_scalar(validation, bounds=(0.0, n), method="bounded").x)
+    best: Any = minimize_scalar(validation, bounds=(0.0, n), method="bounded")
+    return float(best.x)
 
 
 def constant_turns(channel: Channel, speed: float) -> Turns:

@@ -70,7 +70,8 @@ def fault_records_into(
     with resumable(folder):
         times = machine_times(plan, machines)
         left = [machine for machine in longest_first(times) if not _is_there(plan, folder / _name(machine))]
-        what, done = f"{len(machines)} machines, share of the work [%]", sum(times.values()) - sum(map(times.get, left))
+        what = f"{len(machines)} machines, share of the work [%]"
+        done = sum(times.values()) - sum(times[machine] for machine in left)
         outcomes = (runner or Runner()).map(partial(solve_machine, plan), left)
         progress(what, round(100.0 * done / sum(times.values())), 100.0)
         for index, outcome in outcomes:

@@ -286,7 +286,7 @@ def _with_faults(stage: PairSection | BoxPlanetarySection, body: SpaceBody, at: 
         return body
     gears: Any = planetary_set(section)
     words = [f"{stage.name} {text}" for text in fault_words(section)]
-    short, marked = (teeth.get(at, ()) for teeth in (short_teeth(faults, gears), marked_teeth(faults, words)))
+    short, marked = short_teeth(faults, gears).get(at, ()), marked_teeth(faults, words).get(at, ())
     first, count = -teeth_zero(gears)[at[0]][at[1]], body.teeth
     return replace(body, short=renumbered(short, first, count), marked=renumbered(marked, first, count))
 
