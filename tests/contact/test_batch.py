@@ -339,7 +339,7 @@ def test_first_cells_and_springs_are_those_that_equal_forces_would_press():
     expected += [alone, [], alone, [], *([[]] * 8)]
     assert [np.flatnonzero(row).tolist() for row in active[0]] == expected
     # without load what touches
-    sets.given = np.zeros(2)
+    sets.total_load = np.zeros(2)
     assert np.array_equal(batch._ActiveSets._first(sets)[0], gap == 0.0)
 
 

@@ -242,7 +242,7 @@ def test_the_verdict_states_factors_stresses_and_what_they_assume(case, files, f
     heard = points.header.index("microphone [dB(A) re 20 µPa]"), points.header.index("sound power [dB(A) re 1 pW]")
     for column, name in zip(heard, ("pressure_level", "power_level")):
         assert points.rows[1][column] == f"{float(files['housing'][name][1]):.1f}"
-    assert "1e+10 N/m³ radial" in points.notes[0] and "damping ratio 0.05" in points.notes[0]
+    assert any("1e+10 N/m³ radial" in note and "damping ratio 0.05" in note for note in points.notes)
     assert ("3100", "15", "4") in {(row[0], row[2], row[5]) for row in near.rows}
 
 
