@@ -355,11 +355,12 @@ def without_pictures(reference: Reference):
 
 
 def first_line(reference: Reference):
-    """``femgear run`` until the first line of its verdict."""
-    command = [sys.executable, "-m", "femgear.cli", *_run_arguments(reference)]
-    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True) as process:
-        assert any(line.strip() for line in process.stdout)
-        process.terminate()
+    """``femgear run`` until the first line of its verdict, into a new folder: a run that was ended would go on."""
+    with tempfile.TemporaryDirectory() as folder:
+        command = [sys.executable, "-m", "femgear.cli", "run", str(CASE), "-o", f"{folder}/results"]
+        with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True) as process:
+            assert any(line.strip() for line in process.stdout)
+            process.terminate()
 
 
 def script(reference: Reference):
