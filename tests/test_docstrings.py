@@ -2,6 +2,7 @@
 
 import ast
 import re
+from collections.abc import Iterator
 from functools import cache
 from pathlib import Path
 
@@ -57,19 +58,25 @@ def public_functions(path: Path) -> list[tuple[str, ast.FunctionDef]]:
     return [(name, node) for name, node in functions if not node.name.startswith("_")]
 
 
-def test_public_functions_of_arrays_tell_a_shape():
-    """Those without a docstring are described by their protocol or base class."""
-    count, without = 0, []
+def described_functions() -> Iterator[tuple[str, str, list[str]]]:
+    """Walk over all public functions with a docstring: names, docstrings, annotations of what goes in and out."""
     for path in sorted(PACKAGE.rglob("*.py")):
         for name, node in public_functions(path):
             arguments = [*node.args.posonlyargs, *node.args.args, *node.args.kwonlyargs]
-            kinds = [one.annotation for one in arguments if one.annotation is not None]
-            kinds += [node.returns] if node.returns is not None else []
-            docstring = ast.get_docstring(node)
-            if docstring is not None and any(ARRAYS.search(ast.unparse(kind)) for kind in kinds):
-                count += 1
-                if not SHAPE.search(docstring):
-                    without.append(f"{path.relative_to(PACKAGE)}: {name}")
+            kinds = [*(argument.annotation for argument in arguments), node.returns]
+            if (docstring := ast.get_docstring(node)) is not None:
+                annotations = [ast.unparse(kind) for kind in kinds if kind is not None]
+                yield f"{path.relative_to(PACKAGE)}: {name}", docstring, annotations
+
+
+def test_public_functions_of_arrays_tell_a_shape():
+    """Those without a docstring are described by their protocol or base class."""
+    count, without = 0, []
+    for name, docstring, kinds in described_functions():
+        if any(map(ARRAYS.search, kinds)):
+            count += 1
+            if not SHAPE.search(docstring):
+                without.append(name)
     assert count > 700  # the walk found them
     assert without == []
 
@@ -83,22 +90,17 @@ SHARED = re.compile(r"(?m)^((?:\w+, )*\w+)(?: : |\n    )(?=.*(?:\(|[Aa]s |see))"
 def test_public_functions_tell_as_many_shapes_as_they_have_arrays():
     """Of parameters and what is returned; a reference to another docstring counts as a shape."""
     count, without = 0, []
-    for path in sorted(PACKAGE.rglob("*.py")):
-        for name, node in public_functions(path):
-            arguments = [*node.args.posonlyargs, *node.args.args, *node.args.kwonlyargs]
-            kinds = [one.annotation for one in arguments if one.annotation is not None]
-            kinds += [node.returns] if node.returns is not None else []
-            arrays = sum(bool(ARRAY.fullmatch(ast.unparse(kind))) for kind in kinds)
-            docstring = ast.get_docstring(node)
-            if docstring is None or not arrays or "All arrays are (" in docstring:
-                continue
-            count += 1
-            shapes = re.findall(
-                r"\((?:\.\.\.|[^()]*,[^()]*|\d+)\)|\((?=\d+ \()|shape|\b[Aa]s (?:of |those of )?`|see `", docstring
-            )
-            shared = sum(names.count(",") for names in SHARED.findall(docstring))
-            if len(shapes) + shared < arrays:
-                without.append(f"{path.relative_to(PACKAGE)}: {name}")
+    for name, docstring, kinds in described_functions():
+        arrays = sum(bool(ARRAY.fullmatch(kind)) for kind in kinds)
+        if not arrays or "All arrays are (" in docstring:
+            continue
+        count += 1
+        shapes = re.findall(
+            r"\((?:\.\.\.|[^()]*,[^()]*|\d+)\)|\((?=\d+ \()|shape|\b[Aa]s (?:of |those of )?`|see `", docstring
+        )
+        shared = sum(names.count(",") for names in SHARED.findall(docstring))
+        if len(shapes) + shared < arrays:
+            without.append(name)
     assert count > 700  # the walk found them
     assert without == []
 

@@ -35,7 +35,9 @@ from femgear.gears.modifications import roll_at
 if TYPE_CHECKING:
     from femgear.gears.pair import GearSet
 
-_Depth = Annotated[float, Quantity(LENGTH, 0.0, 0.05)]
+MOST_DEPTH = 0.05
+"""Largest depth of a fault [m]."""
+_Depth = Annotated[float, Quantity(LENGTH, 0.0, MOST_DEPTH)]
 _Length = Annotated[float, Quantity(LENGTH, 1e-6, 0.5)]
 _Points = Values(max_length=MOST_POINTS)
 _ENTRIES = {

@@ -9,12 +9,8 @@ import textwrap
 import threading
 import time
 from collections.abc import Iterable, Iterator, Sequence
-from typing import TYPE_CHECKING
 
 from femgear.errors import printable
-
-if TYPE_CHECKING:
-    pass
 
 SILENCE = 10.0
 """Longest time without a line where standard error is a file or a pipe [s]."""

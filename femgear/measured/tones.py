@@ -14,7 +14,7 @@ import numpy as np
 from femgear.housing.orders import OrderSpectrum
 from femgear.measured.channels import Channel
 from femgear.measured.spectra import windowed_spectrum
-from femgear.measured.turns import AngleSignal, Turns, even_angle_times, resample_turns
+from femgear.measured.turns import AngleSignal, Turns, even_angle_times, sampled_at
 
 _FAINTEST = 1e-3
 """Height of tones that are looked for, over the largest value of the spectrum over time."""
@@ -63,21 +63,23 @@ def without_tones(channel: Channel, turns: Turns, *, parts: int = 1) -> tuple[An
     parts : int
         As of `resample_turns`.
     """
-    signal = resample_turns(channel, turns, parts=parts)
+    even = even_angle_times(channel, turns, parts=parts)
+    signal = sampled_at(channel, turns, *even)
     slowest, fastest = turns.speeds
     if (fastest / slowest - 1.0) * signal.highest_order * signal.turns < 1.0:
         return signal, ()
-    times, *_ = even_angle_times(channel, turns, parts=parts)
     tones: list[Tone] = []
     for _ in range(_ROUNDS):
-        batch, channel = _sharp_tones(channel, turns.speeds, signal, times)
+        batch, channel = _sharp_tones(channel, turns.speeds, signal, even[0])
         tones += batch
         if not batch:
             break
-        signal = resample_turns(channel, turns, parts=parts)
+        signal = sampled_at(channel, turns, *even)
+    if not tones:
+        return signal, ()
     kept = _merged(tones, 1.0 / channel.duration)
     steady, channel = _without_drift(kept, channel)
-    return (resample_turns(channel, turns, parts=parts) if steady != kept else signal), steady
+    return (sampled_at(channel, turns, *even) if steady != kept else signal), steady
 
 
 def _sharp_tones(

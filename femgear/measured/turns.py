@@ -302,9 +302,13 @@ def even_angle_times(channel: Channel, turns: Turns, *, parts: int = 1) -> tuple
 
 def resample_turns(channel: Channel, turns: Turns, *, parts: int = 1) -> AngleSignal:
     """Sample a signal anew at the times of `even_angle_times`, which says what is refused."""
+    return sampled_at(channel, turns, *even_angle_times(channel, turns, parts=parts))
+
+
+def sampled_at(channel: Channel, turns: Turns, times: np.ndarray, whole: int, fastest: float) -> AngleSignal:
+    """Sample a signal anew at times (n,) [s] over whole turns, with the largest speed [1/s] in them."""
     from scipy.ndimage import map_coordinates
 
-    times, whole, fastest = even_angle_times(channel, turns, parts=parts)
     values = map_coordinates(channel.values, [(times - channel.start) * channel.rate], order=5, mode="mirror")
     highest, mean = _HIGHEST * channel.rate / fastest, whole / (times[-1] - times[0])
     figures = float(highest), float(mean), turns.error

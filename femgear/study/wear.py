@@ -15,6 +15,7 @@ import numpy as np
 
 from femgear.case import text as case_text
 from femgear.case.dependencies import Steps
+from femgear.case.fault_sections import MOST_DEPTH
 from femgear.case.quantities import SPEED, to_si
 from femgear.errors import CaseError
 from femgear.report.tables import Block, tabulate
@@ -27,8 +28,6 @@ from femgear.trains.registry import check_case, train_of
 MOST_STEPS = 1000
 _HOURS, _COEFFICIENT = (1e-6, 1e9), (1e-24, 1e-9)
 """Ranges of hours [h] and of the wear coefficient [m^2/N]."""
-_MOST_DEPTH = 0.05
-"""Largest depth that a flank may lose [m]: that of entries of wear."""
 _COARSE = 0.05
 """Change by half the steps over the deepest wear above which more steps are advised."""
 _Flanks = dict[tuple[str, int, str], WornFlank]
@@ -129,13 +128,13 @@ def _worn(case: Any, request: WearRequest, count: int, first: Sequence[MeshingTe
 def _refuse_worn_through(case: Any, flanks: _Flanks) -> None:
     """Refuse (CaseError, E-RANGE) hours after which a flank has lost more than a tooth has."""
     deepest = max(float(flank.depth.max()) for flank in flanks.values())
-    if deepest > _MOST_DEPTH:
+    if deepest > MOST_DEPTH:
         raise CaseError(
             "so many hours wear the teeth away",
             code="E-RANGE",
             key="--hours",
             value=f"{1e3 * deepest:.3g} mm off a flank",
-            limit=f"{1e3 * _MOST_DEPTH:g} mm",
+            limit=f"{1e3 * MOST_DEPTH:g} mm",
             remedy="fewer hours, or a smaller --coefficient",
         )
 
