@@ -397,9 +397,9 @@ CATALOGUE = {
     ),
     "W-RIM": Meaning(
         NOTE,
-        "A rim is thin; of rated gears a doubt where the rim factor of ISO 6336-3 does not hold.",
+        "A rim is thin; a doubt where no S_F has it by the rim factor of ISO 6336-3, or the factor ends.",
         "thin rim",
-        "Give a thicker rim: the factor of ISO 6336-3 ends there.",
+        "Give a thicker rim, or material.treatment and hardness for an S_F with the factor.",
     ),
     "W-REXS": Meaning(
         DOUBT,

@@ -14,6 +14,7 @@ from itertools import pairwise
 from femgear.errors import GeometryError
 from femgear.findings import DOUBT, Finding
 from femgear.gears.gear import USUAL_LAND, Gear, GeometryWarning, combined_fault, tooth_thickness
+from femgear.gears.iso6336_root import rim_factor_of
 from femgear.gears.pair import GearPair, GearSet, zero_backlash_distance, zero_backlash_shift
 from femgear.gears.planetary import (
     BACKLASH_TOLERANCE,
@@ -327,20 +328,21 @@ def _single_gears(s: GearSet):
                 f"{gear.name}.{'outer_radius' if gear.internal else 'bore_radius'}",
                 f"the {gear.name}'s rim is {rim * 1e3:.4f} mm thick under teeth of {height * 1e3:.4f} mm; "
                 + _rim_held(gear),
-                ">= 1.2 tooth heights (below, ISO 6336-3 raises the root stress by a rim factor)",
+                ">= 1.2 tooth heights",
             )
 
 
 def _rim_held(gear: Gear) -> str:
-    """How a thin rim is held, and what that does to its mesh stiffness and root stress."""
+    """Say how finite elements hold a thin rim, and by which factor ISO 6336-3 has its influence in S_F."""
+    factor = f"; S_F has the influence of the rim by the factor Y_B = {rim_factor_of(gear):.2f} of ISO 6336-3"
     if gear.internal:
         return (
             'with static.members = "fixed" its outer surface is held rigid and the mesh gets stiffer as it '
-            'thins; with "elastic" it bends on its foundation'
+            f'thins; with "elastic" it bends on its foundation{factor}'
         )
     return (
-        "its bore is held rigid, so that it cannot bend and the mesh gets stiffer as it thins, where a rim "
-        "on a bearing or hub that yields gets softer and its root stress rises: neither is computed"
+        "finite elements hold its bore rigid, as a solid shaft does, so that the mesh gets stiffer as the rim thins. "
+        f"On a bearing or a hub that yields the mesh is softer and the root stress of finite elements higher{factor}"
     )
 
 

@@ -163,6 +163,12 @@ def rim_factor(rim: float, height: float, module: float, *, internal: bool) -> f
     return 1.0 if limit else max((1.15 if internal else 1.6) * math.log(thin), 1.0)
 
 
+def rim_factor_of(gear: Gear) -> float:
+    """Compute the rim thickness factor Y_B of a gear by its own rim, see `rim_factor`."""
+    module = gear.module * math.cos(helix_of(gear)[0])
+    return rim_factor(*_rim_and_height(gear), module, internal=gear.internal)
+
+
 def rim_beyond_range(gear: Gear) -> tuple[float, float] | None:
     """Find a rim that is too thin for `rim_factor`: its thickness and the limit; None of one within the range.
 
@@ -242,7 +248,7 @@ def nominal_root_stress(
     form = share * 6.0 * arm * math.cos(angle) / (chord**2 * math.cos(tooth.pressure_angle))
     correction = stress_correction(chord / arm, 0.5 * chord / fillet)
     inclined, deep = root_helix_factor(helix, overlap, edition), deep_tooth_factor(contact_ratio, grade)
-    thin = rim_factor(*_rim_and_height(gear), m, internal=gear.internal)
+    thin = rim_factor_of(gear)
     nominal = tangential_force / (root_face_width(gear.face_width, common, m) * m)
     return NominalRootStress(
         stress=nominal * form * correction * inclined * thin * deep,

@@ -266,7 +266,8 @@ def judge_strength(
         return Judgement(STRONG, "bad", answer, "; ".join(map(in_words, beyond)), f"Not strong enough: {words}")
     if not rated:
         sentence = f"Its strength is not rated: {without.reason}"
-        return Judgement(STRONG, "open", stresses or "not rated", without.remedy, sentence)
+        limit = "; ".join(filter(None, (without.remedy, _doubts(findings, doubts))))
+        return Judgement(STRONG, "open", stresses or "not rated", limit, sentence)
     low = [(symbol, least, required) for symbol, least, required in rated if not least.value >= required]
     answer = ", ".join(f"{symbol} {least.value:.2f} ({least.where})" for symbol, least, _ in rated)
     in_sentence = ", ".join(

@@ -27,7 +27,7 @@ from femgear.contact.bodies import flank_widths
 from femgear.contact.peaks import FEWEST, peak_doubt, tooth_pair_codes
 from femgear.contact.root_stress import BACK, LOADED, NOTCH_REACH, RootCycle
 from femgear.contact.slices import PARTS as SLICES
-from femgear.findings import Finding, findings_in
+from femgear.findings import DOUBT, Finding, findings_in
 from femgear.gears.checks import check_set, tip_clearances
 from femgear.gears.deviations import check_deviations
 from femgear.gears.friction import path_speeds
@@ -42,7 +42,7 @@ from femgear.report.style import family
 from femgear.report.tables import Block, Marks, chosen, significant, tabulate
 from femgear.stages.drawing_tables import describe_drawing
 from femgear.stages.protocol import StageResult
-from femgear.stages.strength import SIDES, NominalStresses, thin_rims
+from femgear.stages.strength import SIDES, NominalStresses, with_rim_doubts
 from femgear.stages.stress_reasons import largest_pressure, over_hertz, reason_values, stress_reasons
 from femgear.stages.tooth_faults import describe_faults, fault_findings
 from femgear.storage.contents import Contents
@@ -1119,6 +1119,8 @@ def _concerns(finding: Finding, title: str, mate: str) -> bool:
     gear, other = (name.split(",")[0] for name in (title, mate))
     if finding.code == "W-FILLET":
         return finding.concerns == gear and finding.key.startswith(f"{other}.")
+    if finding.code == "W-RIM":
+        return finding.severity == DOUBT and finding.concerns == gear
     return finding.code == "W-KINK" and finding.concerns in (gear, title)
 
 
@@ -1182,7 +1184,8 @@ def describe_set(case: Case) -> tuple[Block, ...]:
 def set_warnings(case: Case) -> Iterator[Finding]:
     """List what is allowed in any planetary set but deserves a look."""
     gears = planetary_set(case)
-    yield from (*check_set(gears, overlap=case_overlap(case, gears)), *thin_rims(case), *case.notices)
+    yield from with_rim_doubts(check_set(gears, overlap=case_overlap(case, gears)), case)
+    yield from case.notices
     yield from load_warnings(case)
 
 

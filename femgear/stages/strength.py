@@ -8,7 +8,7 @@ the computed one, and K_Halpha is that of part 1, where the case gives a flank t
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
@@ -46,7 +46,7 @@ from femgear.gears.iso6336_load import (
     running_in,
     transverse_load_factors,
 )
-from femgear.gears.iso6336_root import NominalRootStress, nominal_root_stress, rim_beyond_range
+from femgear.gears.iso6336_root import NominalRootStress, nominal_root_stress, rim_beyond_range, rim_factor_of
 from femgear.gears.iso6336_stiffness import BENDING_SHARE, line_load_factor, material_factor, pair_mesh_stiffness
 from femgear.gears.kinematics import speeds
 from femgear.gears.pair import BRANCH, GearSet
@@ -631,20 +631,46 @@ def rating_wanted(case: Any) -> bool:
     return given or any(material.root_stress_limit or material.contact_stress_limit for material in limits)
 
 
+def with_rim_doubts(findings: Iterable[Finding], case: Any) -> Iterator[Finding]:
+    """Put the doubts of `thin_rims` in the place of the notes on the same rims, among the findings of gears."""
+    doubts = {finding.key: finding for finding in thin_rims(case)}
+    for finding in findings:
+        if finding.code != "W-RIM" or finding.key not in doubts:
+            yield finding
+    yield from doubts.values()
+
+
 def thin_rims(case: Any) -> Iterator[Finding]:
-    """Tell rated gears whose rim is too thin for the rim factor of ISO 6336-3 (W-RIM)."""
+    """List the gears whose root stress rests on a thin rim that no number has (W-RIM, a doubt).
+
+    S_F has the influence of a rim by Y_B of ISO 6336-3, down to half a tooth height (of rings 1.75 modules): thinner
+    rims of rated gears are a doubt. Without S_F only finite elements give a root stress, and they hold the bore of a
+    gear rigid: rims of less than 1.2 tooth heights, above which Y_B is 1, are a doubt then.
+    """
     for name, gear in zip(case.gear_names, planetary_set(case).gears, strict=True):
-        beyond = rim_beyond_range(gear)
-        if beyond is None or gear_material(case, name).root_stress_limit is None:
-            continue
-        thickness, limit = beyond
-        unit = "modules" if gear.internal else "tooth heights"
-        yield Finding(
-            "W-RIM",
-            f"{name}.{'outer_radius' if gear.internal else 'bore_radius'}",
-            f"the rim of {gear_words(name)} is {thickness:.3g} {unit} thick: its S_F and life rest on a rim "
-            "factor Y_B outside its range",
-            remedy="a thicker rim",
-            severity=DOUBT,
-            limit=f"more than {limit:g} {unit} (ISO 6336-3)",
-        )
+        rated, beyond = gear_material(case, name).root_stress_limit is not None, rim_beyond_range(gear)
+        key = f"{name}.{'outer_radius' if gear.internal else 'bore_radius'}"
+        if rated and beyond is not None:
+            thickness, limit = beyond
+            unit = "modules" if gear.internal else "tooth heights"
+            yield Finding(
+                "W-RIM",
+                key,
+                f"the rim of {gear_words(name)} is {thickness:.3g} {unit} thick: its S_F and life rest on a rim "
+                "factor Y_B outside its range",
+                remedy="a thicker rim",
+                severity=DOUBT,
+                limit=f"more than {limit:g} {unit} (ISO 6336-3)",
+                concerns=gear_words(name).removeprefix("the "),
+            )
+        elif not rated and not gear.internal and (factor := rim_factor_of(gear)) > 1.0:
+            yield Finding(
+                "W-RIM",
+                key,
+                f"the rim of {gear_words(name)} is thin and its bore held rigid, as by a solid shaft; where the rim "
+                f"stands free ISO 6336-3 raises its root stress by Y_B = {factor:.2f}, which no S_F has in this case",
+                remedy="give material.treatment and hardness for an S_F with Y_B, or a thicker rim",
+                severity=DOUBT,
+                limit=">= 1.2 tooth heights",
+                concerns=gear_words(name).removeprefix("the "),
+            )

@@ -10,6 +10,7 @@ from steels import NO_STEELS
 from femgear.case.gear_set import planetary_set
 from femgear.gears.iso6336 import overlap_of
 from femgear.gears.iso6336_load import dynamic_factor_of_speed
+from femgear.stages.static_results import root_doubts, set_warnings
 from femgear.stages.strength import (
     OF_ROOTS,
     case_stresses,
@@ -45,12 +46,26 @@ H501 = {
 def test_rated_gears_whose_rim_factor_does_not_hold_raise_a_doubt(planetary):
     """A rim of the planet of 0.185 tooth heights, and one of the ring of 1.08 modules; the sun has a thick one."""
     thin = with_values(planetary, {"planet.bore_radius": "27.5 mm", "ring.outer_radius": "84.5 mm"})
-    assert not [*thin_rims(thin)]  # nothing is rated
     planet, ring = thin_rims(with_values(thin, LIMITS))
     assert (planet.code, planet.severity, planet.key) == ("W-RIM", "doubt", "planet.bore_radius")
     assert "0.185 tooth heights" in planet.text and "0.5" in planet.limit
     assert ring.key == "ring.outer_radius" and "1.08 modules" in ring.text and "1.75" in ring.limit
     assert planet.code in OF_ROOTS and not [*thin_rims(with_values(planetary, LIMITS))]
+
+
+def test_thin_rims_without_a_safety_raise_a_doubt_in_the_place_of_the_note(planetary):
+    """S_F of a rated gear has the rim by Y_B; without S_F finite elements with a rigid bore give all that is known."""
+    thin = with_values(planetary, {"planet.bore_radius": "26 mm"})
+    (doubt,) = [finding for finding in set_warnings(thin) if finding.code == "W-RIM"]
+    assert (doubt.severity, doubt.key, doubt.concerns) == ("doubt", "planet.bore_radius", "planet")
+    gear = planetary_set(thin).planet
+    thickness, height = gear.root_radius - gear.rim_radius, gear.tip_radius - gear.root_radius
+    assert f"Y_B = {1.6 * math.log(2.242 * height / thickness):.2f}" in doubt.text
+    assert root_doubts([doubt], "planet, ring side", "ring") == ["W-RIM"]
+    assert not root_doubts([doubt], "sun", "planet, sun side")
+    (note,) = [finding for finding in set_warnings(with_values(thin, LIMITS)) if finding.code == "W-RIM"]
+    assert (note.severity, note.key) == ("note", "planet.bore_radius")
+    assert not root_doubts([note], "planet, ring side", "ring")
 
 
 @pytest.fixture(scope="module")

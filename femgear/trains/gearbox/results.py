@@ -23,7 +23,7 @@ from femgear.report.tables import Block, describe_modes, tabulate
 from femgear.stages.life_results import describe_damage, describe_life, life_findings
 from femgear.stages.planet_bearings import describe_planet_bearings, planet_bearing_findings
 from femgear.stages.protocol import StageResult
-from femgear.stages.strength import thin_rims
+from femgear.stages.strength import with_rim_doubts
 from femgear.stages.tooth_faults import left_out_of_faults
 from femgear.storage.contents import Contents
 from femgear.storage.results import coordinates, mode_entries
@@ -678,7 +678,7 @@ def _of_teeth(case: GearboxCase) -> Iterator[Finding]:
             if (teeth := teeth_of(stage)) is None:
                 continue
             rims = [finding for finding in check_meshes(planetary_set(teeth)) if finding.code == "W-RIM"]
-            for finding in (*estimated_materials(teeth), *rims, *thin_rims(teeth), *left_out_of_faults(teeth)):
+            for finding in (*estimated_materials(teeth), *with_rim_doubts(rims, teeth), *left_out_of_faults(teeth)):
                 alike = finding.code, finding.key, finding.text
                 first.setdefault(alike, replace(finding, key=f"{kind}[{i}].teeth.{finding.key}"))
                 count[alike] += 1

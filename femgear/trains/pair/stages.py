@@ -74,7 +74,7 @@ from femgear.stages.static_results import (
     load_warnings,
     mean_over_period,
 )
-from femgear.stages.strength import thin_rims
+from femgear.stages.strength import with_rim_doubts
 from femgear.stages.strength_results import strength_verdict
 from femgear.stages.tooth_faults import describe_faults
 from femgear.stages.tooth_figures import pair_key_figures
@@ -190,7 +190,8 @@ def _describe_static(results: Results) -> Block:
 def _warnings(case: PairCase) -> Iterator[Finding]:
     """List what is allowed but deserves a look."""
     gears = planetary_set(case)
-    yield from (*check_meshes(gears, overlap=case_overlap(case, gears)), *thin_rims(case), *case.notices)
+    yield from with_rim_doubts(check_meshes(gears, overlap=case_overlap(case, gears)), case)
+    yield from case.notices
     yield from load_warnings(case)
     if case.operation.speeds and (why := _no_modes(case)):
         text = f"no effect, static results are all: {why}"
