@@ -633,6 +633,11 @@ def in_words(code: str) -> str:
     return f"{CATALOGUE[code].words} ({code})"
 
 
+def percent(share: float, places: int = 0, *, signed: bool = False) -> str:
+    """Write a share in per cent with so many places, a space before the sign (ISO 80000-1): ``"22 %"``."""
+    return f"{100.0 * share:{'+' * signed}.{places}f} %"
+
+
 def remark(text: str) -> Finding:
     """Make a finding without code and entry: what was read in a way that deserves to be said."""
     return Finding("", "", text)

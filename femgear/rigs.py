@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any, NoReturn
 import numpy as np
 
 from femgear.errors import CaseError
+from femgear.findings import percent
 from femgear.measured.heard_set import HeardSet, heard_set
 from femgear.measured.lines import order_tolerance, sharpened_lines
 from femgear.measured.recordings import read_by_turns
@@ -258,7 +259,9 @@ def judge_rig(rig: Rig, path: str | os.PathLike, recording: Recording) -> Block:
     if not check.lines:
         _refuse_to_judge("no line stands out near a mesh harmonic", os.fsdecode(path))
     if check.whole < _LEAST_WHOLE:
-        words = f"of the lines near mesh harmonics {check.whole:.0%} lie at whole orders, at the speed that is taken"
+        words = (
+            f"of the lines near mesh harmonics {percent(check.whole)} lie at whole orders, at the speed that is taken"
+        )
         _refuse_to_judge(words, os.fsdecode(path))
     title = f"{rig.name}: {os.path.basename(os.fsdecode(path))}"
     return Block(title, ("", "found", "allowed", ""), tuple(_rows(rig, check)))
@@ -295,7 +298,7 @@ _WORDS = {True: "passed", False: "not passed", None: "no line to compare"}
 def _rows(rig: Rig, check: RigCheck) -> Iterator[tuple[str, ...]]:
     """Rows of the rule: what was found, what is allowed, whether it passed."""
     words = [_WORDS[verdict] for verdict in check.passed(rig)]
-    at_multiples = f"{check.share:.0%} of {check.lines}"
+    at_multiples = f"{percent(check.share)} of {check.lines}"
     yield f"lines at multiples of {rig.planets}", at_multiples, "100 %", words[0]
     if rig.in_phase:
         limit = f"below {_IN_PHASE_SHARE:g} of the largest"

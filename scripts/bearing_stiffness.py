@@ -14,6 +14,7 @@ from cyclopts import Parameter
 from script_tools import print_table, ready_folder, run_script, say_files, write_csv
 
 from femgear.errors import CaseError
+from femgear.findings import percent
 from femgear.system.rolling_bearings import BallBearing, Bearing, RollerBearing, bearing_state, solve_motion
 
 FILES = ("bearing_stiffness.csv", "bearing_stiffness.png")
@@ -87,7 +88,7 @@ def shown(row: tuple[float, ...]) -> list[str]:
         f"{1e6 * motion:.1f}",
         *(f"{1e-6 * value:.0f}" for value in (radial, axial)),
         f"{1e-3 * tilt:.1f}",
-        f"{share:.0%}",
+        percent(share),
     ]
 
 

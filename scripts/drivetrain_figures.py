@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from femgear.findings import percent
+
 # Factors of the sensitivity study: contact ratios stay above one, angles and phases are shifted.
 STEPS = {"contact": (0.85, 1.1), "other": (0.5, 2.0)}
 # Steps a second of the sensitivity study [Hz].
@@ -52,7 +54,7 @@ def backlash_figure(case, *, steps: int = 100_000):
         curves.append(("linear mesh, which pulls", linear.run.force[shown, mesh]))
     words = (
         f"{run.meshes[mesh]} parts first at {run.time[first]:.4g} s; apart for "
-        f"{run.lost[mesh]:.2%} of the first {run.time[-1]:.4g} s"
+        f"{percent(run.lost[mesh], 2)} of the first {run.time[-1]:.4g} s"
     )
     return over_time(time, [(words, curves)], unit="mesh force [kN]", factor=1e-3), words
 

@@ -13,6 +13,7 @@ from cyclopts import Parameter
 from script_tools import REFERENCE_CASE, Progress, print_table, ready_folder, run_script, say_files, write_csv
 
 from femgear.errors import CaseError
+from femgear.findings import percent
 
 CSV_HEADER = ("carrier order", "harmonic", "offset", "exact [m/s^2]", "Hanning [relative]")
 LINEAR = "linear [m/s^2]"
@@ -182,7 +183,7 @@ def _print_lines(band_models: Heard, dynamics, speed: str):
         lobes = len(band.lobes.position)
         print(f"{name}: {lobes} lobes of the envelope a revolution, strongest lines {strong}")
     threshold = band_models.bands["exact"].lobes.threshold
-    print(f"a lobe stands out by at least {threshold:.0%} of the largest envelope value")
+    print(f"a lobe stands out by at least {percent(threshold)} of the largest envelope value")
 
 
 def _draw(folder: Path, speed: str, band_models: Heard, teeth: int) -> None:

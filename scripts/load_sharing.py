@@ -12,6 +12,7 @@ from cyclopts import Parameter
 from script_tools import REFERENCE_CASE, Progress, print_table, ready_folder, run_script, say_files, write_csv
 
 from femgear.errors import CaseError
+from femgear.findings import percent
 
 FILES = ("load_sharing.csv", "tooth_loads.csv", "load_sharing.png", "tooth_loads.png")
 
@@ -171,7 +172,7 @@ def _print_shares(gaps, cycles, planet, plain):
             rows.append((f"{gap * 1e6:g}", str(n + 1), *text, springs, f"{largest:.1f}"))
         for n in np.flatnonzero(cycle.open_planets.any(axis=1)):
             part = cycle.open_planets[n].mean()
-            notes.append(f"gap {gap * 1e6:g} um: planet {n + 1} carries nothing over {part:.0%} of the cycle")
+            notes.append(f"gap {gap * 1e6:g} um: planet {n + 1} carries nothing over {percent(part)} of the cycle")
     header = (
         "gap [um]",
         "planet",

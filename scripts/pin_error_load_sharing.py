@@ -14,6 +14,7 @@ from cyclopts import Parameter
 from script_tools import REFERENCE_CASE, Progress, print_table, ready_folder, run_script, say_files, write_csv
 
 from femgear.errors import CaseError
+from femgear.findings import percent
 
 FILES = ("load_sharing_samples.csv", "load_sharing_histogram.png")
 QUANTILES = (0.5, 0.9, 0.99)
@@ -208,13 +209,13 @@ def _print_summary(results, names, pins, sigma, seed):
         factor = sharing.factor
         numbers = [factor.mean(), *np.quantile(factor, QUANTILES), factor.max()]
         opened = sharing.open_planets.any(axis=1).mean()
-        rows.append((names[kind], *(f"{v:.4f}" for v in numbers), f"{opened:.2%}"))
+        rows.append((names[kind], *(f"{v:.4f}" for v in numbers), percent(opened, 2)))
         notes.append(
             f"{names[kind]}: curves {facts['curves']:.2f} s, samples {facts['samples']:.2f} s; "
             f"{facts['checked']} samples by the whole contact problem differ by {facts['difference']:.1e} of "
             "the torque"
         )
-    header = ("supports", "mean", *(f"{q:.0%}" for q in QUANTILES), "largest", "a planet opens")
+    header = ("supports", "mean", *(percent(q) for q in QUANTILES), "largest", "a planet opens")
     title = (
         f"Load sharing factor, {len(pins)} samples, seed {seed}; standard deviations {sigma[0] * 1e6:g} um "
         f"radial, {sigma[1] * 1e6:g} um tangential"

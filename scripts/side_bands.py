@@ -18,6 +18,7 @@ from script_tools import REFERENCE_CASE, print_table, ready_folder, run_script, 
 
 from femgear.case.quantities import SPEED, to_si
 from femgear.errors import CaseError
+from femgear.findings import percent
 from femgear.housing.orders import (
     FOREIGN,
     NORMAL,
@@ -331,7 +332,7 @@ def _print_lines(
     print(", ".join(f"{count} {word}" for word, count in counts))
     if any(gear_set.teeth[1:]):
         likely = chance(tolerance, gear_set.teeth, spacing_symmetry(gear_set.angles), heard_parts)
-        print(f"an order without meaning fits turns of sun or planet by chance in {likely:.0%} of cases at most")
+        print(f"an order without meaning fits turns of sun or planet by chance in {percent(likely)} of cases at most")
 
 
 if __name__ == "__main__":

@@ -18,7 +18,7 @@ import xarray as xr
 from planet_gearboxes import uneven_planets
 
 from femgear import cli
-from femgear.findings import CATALOGUE, SEVERITIES, Finding, FindingWarning, as_data, from_data, once, remark
+from femgear.findings import CATALOGUE, SEVERITIES, Finding, FindingWarning, as_data, from_data, once, percent, remark
 from femgear.report.tables import lower_bound
 from femgear.run import solve
 from femgear.stages.static_results import describe_stress
@@ -683,3 +683,16 @@ def test_a_code_that_the_catalogue_has_no_more_is_read_as_text():
     data = [{"code": "W-GONE", "key": "a.b", "text": "words", "severity": "doubt", "stage": "static"}]
     (finding,) = from_data(data)
     assert str(finding) == "a.b: [W-GONE] words" and (finding.severity, finding.stage) == ("doubt", "static")
+
+
+def test_shares_have_a_space_before_the_sign_of_per_cent():
+    """ISO 80000-1, 7.1.4; no text of the package writes one otherwise."""
+    assert (percent(0.216), percent(0.0155, 1), percent(0.5, signed=True)) == ("22 %", "1.6 %", "+50 %")
+    assert percent(-0.081, 1, signed=True) == "-8.1 %"
+    package = Path(cli.__file__).parent
+    without = [
+        str(path.relative_to(package))
+        for path in sorted(package.rglob("*.py"))
+        if "app" not in path.relative_to(package).parts and re.search(r":[^{}\"\s]*%\}", path.read_text("utf-8"))
+    ]
+    assert without == []

@@ -62,7 +62,7 @@ def test_the_command_lists_writes_and_judges(tmp_path, capsys):
     file = write_columns(tmp_path / "a.csv", "time [s];acc [g]\n", columns)
     assert cli.main(["rigs", "SDUST", str(file), "--speed", f"{carrier * 60 * 5.001} rpm", "--within", "0.005"]) == 0
     printed = capsys.readouterr().out
-    assert printed.count(" passed") == 2 and "100% of 3" in printed
+    assert printed.count(" passed") == 2 and "100 % of 3" in printed
     assert cli.main(["rigs", "none"]) == 2 and "E-CHOICE" in capsys.readouterr().err
     with pytest.raises(CaseError, match="no such rig"):
         find_rig("none")

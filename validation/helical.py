@@ -9,6 +9,7 @@ from itertools import product
 import numpy as np
 from published.planetary_sets import TABLE_2, cases, kahraman_set
 
+from femgear.findings import percent
 from femgear.gears.phasing import phase_factors
 from femgear.solvers.linear.receptance import modal_error_response
 from femgear.stages.lumped_set import gear_set_modes
@@ -230,7 +231,7 @@ def response() -> tuple[Row, ...]:
         choices = np.array(TABLE_4[kind][0])
         mode = mode or choices[np.abs(choices - peak).argmin()]
         name = f"case {letter}, harmonic {h}: highest peak from 5 to 15 kHz, {kind} mode [Hz]"
-        note = f"{light:.1%} damping; {wide:.0f} Hz with 5 %"
+        note = f"{percent(light, 1)} damping; {wide:.0f} Hz with 5 %"
         rows.append(within("K", PAPER, name, mode, peak, light, note=note))
     return tuple(rows)
 

@@ -16,7 +16,7 @@ import numpy as np
 from femgear.case.lubrication import LubricantSection, oil_at
 from femgear.case.quantities import RPM
 from femgear.errors import CaseError
-from femgear.findings import Finding
+from femgear.findings import Finding, percent
 from femgear.gears.friction import FRICTION_LAWS, PathSpeeds, path_speeds, table_friction
 from femgear.gears.kinematics import speeds
 from femgear.gears.profile import base_helix_angle
@@ -132,10 +132,12 @@ def friction_findings(case: Any, gears: GearSet) -> Iterator[Finding]:
         first, other = (f"{speed / RPM:.5g} rpm" for speed in speeds_of_operation[[0, at]])
         text = (
             f"friction acts at all speeds with the coefficient {coefficients[0, kind]:.3g} of {first}; at {other} it "
-            f"would be {coefficients[at, kind]:.3g}, {change[at, kind]:+.0%}"
+            f"would be {coefficients[at, kind]:.3g}, {percent(change[at, kind], signed=True)}"
         )
         remedy = "put the speed that matters first, or compute speeds by themselves"
-        yield Finding("W-FRICTION", "losses.friction", text, remedy=remedy, limit=f"within {NOTICEABLE_CHANGE:.0%}")
+        yield Finding(
+            "W-FRICTION", "losses.friction", text, remedy=remedy, limit=f"within {percent(NOTICEABLE_CHANGE)}"
+        )
 
 
 def _friction_at(case: Any, gears: GearSet, speed: float) -> tuple[float, ...]:

@@ -69,7 +69,7 @@ class Progress:
         self._bars = progress.Progress(
             progress.TextColumn("{task.description}", markup=False),
             progress.BarColumn(),
-            progress.TaskProgressColumn(),
+            progress.TextColumn("{task.percentage:>3.0f} %", style="progress.percentage"),
             progress.MofNCompleteColumn(),
             progress.TimeElapsedColumn(),
             progress.TimeRemainingColumn(),

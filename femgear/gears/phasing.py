@@ -26,6 +26,7 @@ from dataclasses import dataclass, fields
 import numpy as np
 
 from femgear.errors import GeometryError
+from femgear.findings import percent
 from femgear.gears.gear import TEETH_RANGE, is_whole
 from femgear.gears.kinematics import sun_ratio
 from femgear.gears.planetary import PlanetarySet, assembly_positions, check_angles, check_planets
@@ -504,7 +505,7 @@ def check_teeth(phasing: MeshPhasing, planet_teeth: int) -> tuple[str, ...]:
     teeth, misfit = f"{sun}/{planet_teeth}/{ring}", ring - sun - 2 * planet_teeth
     if abs(misfit) > _CLOSURE * (sun + planet_teeth):
         message = f"{teeth}: z_r - z_s - 2 z_p = {misfit}, more than profile shifts can take up"
-        limit, remedy = f"{_CLOSURE:.0%} of z_s + z_p", f"{(ring - sun) // 2} teeth close this set"
+        limit, remedy = f"{percent(_CLOSURE)} of z_s + z_p", f"{(ring - sun) // 2} teeth close this set"
         raise GeometryError(message, code="E-CHOICE", key="planet teeth", limit=limit, remedy=remedy)
     if abs(misfit) > 1:
         problems.append(f"z_r - z_s - 2 z_p = {misfit}: profile shifts of about {abs(misfit) / 2:g} times the module")

@@ -11,7 +11,7 @@ import numpy as np
 
 from femgear.case.quantities import SPEED, to_si
 from femgear.errors import CaseError
-from femgear.findings import Finding, tell
+from femgear.findings import Finding, percent, tell
 from femgear.measured.aligned_speed import aligned_speed, widest_range
 from femgear.measured.channels import Channel, choose_channel, cut_channel
 from femgear.measured.csv_signals import read_csv_signals
@@ -200,7 +200,9 @@ def _tell_drift(signal: Channel, speed: float, orders: np.ndarray, further: np.n
     first, second = (aligned_speed(part, speed, orders, within, further=further) for part in halves)
     smeared = abs(first - second) / speed * float(orders[-1])
     if smeared > 1.0 / (signal.duration * speed):
-        words = f"from the first half to the second the speed changes by {abs(second / first - 1):.2%}, and order "
+        words = (
+            f"from the first half to the second the speed changes by {percent(abs(second / first - 1), 2)}, and order "
+        )
         words += f"{orders[-1]} is smeared over {smeared:.2g} orders"
         remedy = "record pulses, or take a part of steady speed by --begin and --end"
         tell(Finding("W-UNSTEADY", "--speed", words, remedy=remedy))

@@ -19,6 +19,7 @@ from typing import Any
 import numpy as np
 
 from femgear.errors import CaseError
+from femgear.findings import percent
 from femgear.measured.channels import Channel
 
 _HYSTERESIS = 0.1
@@ -276,7 +277,7 @@ def even_angle_times(channel: Channel, turns: Turns, *, parts: int = 1) -> tuple
         )
         raise channel.problem(message, limit=f"{LEAST_TURNS} or more", remedy=remedy)
     if covered < 0.5:
-        message, value = "pulses cover a part of the signal alone", f"{covered:.0%} of {channel.duration:.4g} s"
+        message, value = "pulses cover a part of the signal alone", f"{percent(covered)} of {channel.duration:.4g} s"
         remedy = "check the rate of either channel, or take the time of the pulses alone by --begin and --end"
         raise channel.problem(message, value=value, limit="50 % or more", remedy=remedy)
     slowest, fastest = kept.speeds

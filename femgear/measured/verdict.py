@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from femgear.errors import CaseError
-from femgear.findings import Finding, tell
+from femgear.findings import Finding, percent, tell
 from femgear.housing.orders import OrderSpectrum, array_factor, spacing_symmetry
 from femgear.measured.averages import carrier_average, gear_average
 from femgear.measured.channels import choose_channel
@@ -138,7 +138,7 @@ def _tell_wrong_turns(mesh: MeshLines, recording: Recording, highest: float, *, 
         words = "no line lies where a healthy set has lines, and those of a faulty one are among them"
     if mesh.factor != 1.0:
         words = f"lines lie far better at orders of the set if the carrier made {mesh.factor:.4g} times as many turns: "
-        words += f"{mesh.share_then:.0%} of them near mesh harmonics, not {mesh.share:.0%}"
+        words += f"{percent(mesh.share_then)} of them near mesh harmonics, not {percent(mesh.share)}"
     key = "--speed" if recording.pulses is None else "--pulses"
     ways = "the speed of the input" if recording.pulses is None else "--pulses-of and --per-turn"
     tell(Finding("W-UNSTEADY", key, words, remedy=f"check {ways}, and that the recording is one of this set"))
@@ -238,7 +238,7 @@ def _notes(verdict: MeasuredVerdict) -> Iterator[str]:
     heard_parts = {line.place.part for line in verdict.lines if line.place.part}
     gear_set = verdict.gear_set
     likely = chance(verdict.tolerance, gear_set.teeth, spacing_symmetry(gear_set.angles), heard_parts)
-    yield f"an order without meaning fits turns of sun or planet by chance in {likely:.0%} of cases at most"
+    yield f"an order without meaning fits turns of sun or planet by chance in {percent(likely)} of cases at most"
 
 
 def _hum_notes(verdict: MeasuredVerdict) -> Iterator[str]:

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from femgear.findings import percent
 from femgear.report.page import chart_figure, document, folded, part_of, shown_data, table
 from femgear.report.tables import MARKS, WARNINGS, Block, is_bound, merged_names, unmarked
 
@@ -157,7 +158,7 @@ def _key_figures(train: Train, runs: Sequence[Results], names: Sequence[str]) ->
         unit = f" [{figure.dimension.shown}]".replace(" [1]", "")
         size = max(figure.relative_change(first, x) for x in others)
         rows.append((not figure.whole, -size, (f"{name}{unit}", figure.show(first), *shown)))
-    notes = (f"{same} figures of parts change by less than {_LEAST_CHANGE:.1%}",) if same else ()
+    notes = (f"{same} figures of parts change by less than {percent(_LEAST_CHANGE, 1)}",) if same else ()
     if rows or same:
         rows.sort(key=lambda row: row[:2])
         yield Block("Key figures", ("figure", *_with_changes(names)), tuple(row[-1] for row in rows), notes)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from femgear.findings import CATALOGUE, NOTE, Finding, by_severity, findings_in
+from femgear.findings import CATALOGUE, NOTE, Finding, by_severity, findings_in, percent
 from femgear.report.response import some_at_a_time, stored_harmonics
 from femgear.report.style import NOTICEABLE
 from femgear.system.fourier import fluctuation, sample
@@ -365,7 +365,7 @@ def pull(where: str, names, least, share, *, more: str = "", remedy: str) -> Fin
     """
     mesh = int(np.argmin(least))
     text = (
-        f"{where}: {names[mesh]} pulls for {share[mesh]:.2%} of the time, with up to "
+        f"{where}: {names[mesh]} pulls for {percent(share[mesh], 2)} of the time, with up to "
         f"{-1e-3 * least[mesh]:.4g} kN: real teeth would part{more}"
     )
     return Finding("W-PULL", "", text, remedy=remedy)

@@ -15,13 +15,19 @@ from typing import Any, Literal
 import numpy as np
 
 from femgear.case.sections import StrengthSection
-from femgear.findings import CATALOGUE, DOUBT, FAULT, NOTE, Finding, counted, in_words
+from femgear.findings import CATALOGUE, DOUBT, FAULT, NOTE, Finding, counted, in_words, percent
 from femgear.report.tables import Block, merged_names
 from femgear.stages.life_results import SYMBOLS, first_to_fail, hours_text
 from femgear.stages.strength import OF_ROOTS, RatedFlank, Rating, gear_words
 
-State = Literal["good", "look", "bad", "open"]
-_WORDS: dict[State, str] = {"good": "✓ holds", "look": "▲ look", "bad": "✕ fails", "open": "○ no limit"}
+State = Literal["good", "look", "bad", "open", "absent"]
+_WORDS: dict[State, str] = {
+    "good": "✓ holds",
+    "look": "▲ look",
+    "bad": "✕ fails",
+    "open": "○ no limit",
+    "absent": "○ not computed",
+}
 """What the colour of a card says, for those who see no colours."""
 FAULTY, STRONG, LIFE, HEAT, SMOOTH, QUIET, SURE = (
     "What does the fault do?",
@@ -53,12 +59,12 @@ class Judgement:
     Parameters
     ----------
     question : str
-    state : {"good", "look", "bad", "open"}
-        Holds; deserves a look; fails; nothing to judge by.
+    state : {"good", "look", "bad", "open", "absent"}
+        Holds; deserves a look; fails; no limit to judge by; not computed.
     answer : str
         In figures.
     limit : str
-        What the state rests on, or which entry of the case would give a limit.
+        What the state rests on, or which entry of the case would give a limit, or the number.
     sentence : str
         The answer as a part of a text, empty where it needs no words.
     """
@@ -267,7 +273,7 @@ def judge_strength(
     if not rated:
         sentence = f"Its strength is not rated: {without.reason}"
         limit = "; ".join(filter(None, (without.remedy, _doubts(findings, doubts))))
-        return Judgement(STRONG, "open", stresses or "not rated", limit, sentence)
+        return Judgement(STRONG, "open" if stresses else "absent", stresses or "not rated", limit, sentence)
     low = [(symbol, least, required) for symbol, least, required in rated if not least.value >= required]
     answer = ", ".join(f"{symbol} {least.value:.2f} ({least.where})" for symbol, least, _ in rated)
     in_sentence = ", ".join(
@@ -407,7 +413,7 @@ def judge_heat(results: Any) -> Iterator[Judgement]:
         yield Judgement(HEAT, "open", answer, remedy, sentence)
 
 
-def judge_smoothness(answer: str, results: Any, stages: Sequence[str]) -> Judgement:
+def judge_smoothness(answer: str, results: Any, stages: Sequence[str], remedy: str) -> Judgement:
     """Judge the run by what speaks against it: teeth that part or press on both flanks, motions that are not stable.
 
     So do planets that carry nothing at some positions, and mesh forces of which too few harmonics were taken.
@@ -419,10 +425,12 @@ def judge_smoothness(answer: str, results: Any, stages: Sequence[str]) -> Judgem
     results : Results
     stages : sequence of str
         Stages that the train has with motion; where a run has none of them nothing is judged.
+    remedy : str
+        What gives the run a motion.
     """
     present = [stage for stage in stages if stage in results.stages]
     if not present:
-        return Judgement(SMOOTH, "open", answer or "not known", "no motion was computed")
+        return Judgement(SMOOTH, "absent", answer or "no motion", remedy)
     against = list(dict.fromkeys(_against(results, present)))
     rests_on = f"; {words}" if (words := estimates_words(results.findings)) else ""
     if not against and any(finding.code == "W-TAIL" and finding.severity == DOUBT for finding in results.findings):
@@ -534,7 +542,7 @@ def resonance_of_line(line: str, hertz: float, modes: np.ndarray, share: float) 
         return ""
     side = "below" if distance[mode] < 0.0 else "above"
     apart = f"{abs(distance[mode]):.1f} % {side} mode {mode + 1} at {modes[mode]:,.0f} Hz"
-    return f"{line}, {apart}, makes {share:.0%} of the power"
+    return f"{line}, {apart}, makes {percent(share)} of the power"
 
 
 def judge_noise(
@@ -545,6 +553,8 @@ def judge_noise(
     margins: Sequence[LevelMargin] = (),
     doubts: str = "",
     rests_on: str = "",
+    *,
+    computed: bool = True,
 ) -> Judgement:
     """Judge how loud it is: by the limits of the case, else by resonances at speeds of operation.
 
@@ -564,11 +574,15 @@ def judge_noise(
         Doubts of the levels, in words: such levels deserve a look, below a limit and without one.
     rests_on : str
         What they rest on that is estimated, in words.
+    computed : bool
+        Whether there is a level; ``open_words`` say what gives one where there is none.
     """
 
     def doubted(*limit: str) -> str:
         return "; ".join(filter(None, (*limit, doubts, rests_on)))
 
+    if not computed:
+        return Judgement(QUIET, "absent", answer, open_words, sentence)
     if margins:
         worst = max(margins, key=lambda margin: margin.decibels)
         if worst.decibels > 0.0:

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from femgear.findings import Finding
+from femgear.findings import Finding, percent
 from femgear.report.tables import Block, Marks, merged_names, tabulate
 from femgear.stages.key_figures import HOURS, NUMBER, KeyFigure, Stored
 from femgear.stages.strength import OF_ROOTS, OF_TEETH
@@ -124,7 +124,7 @@ def life_rows(data: Any, marks: Marks, of: tuple[str, ...] = ("life",)) -> Itera
 def _share_text(share: float, life: float) -> str:
     """Write the share of a load case in a damage; of what fails at once, whether it does in this load case."""
     if life > 0.0:
-        return f"{share:.2%}"
+        return percent(share, 2)
     return "fails at once" if share > 0.0 else "-"
 
 
@@ -145,7 +145,7 @@ def _most_damage(data: Any, kind: str, number: int) -> str:
         beyond = [str(name) for name, part in zip(data["load_case"].values, share, strict=True) if part > 0.0]
         more = f" and {len(beyond) - 3} more" if len(beyond) > 3 else ""
         return f"fails at once in {', '.join(beyond[:3])}{more}: beyond the static strength"
-    return f"{share[at]:.0%} of the damage in {data['load_case'].values[at]}"
+    return f"{percent(share[at])} of the damage in {data['load_case'].values[at]}"
 
 
 def hours_text(hours: float) -> str:

@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from femgear.findings import Finding
+from femgear.findings import Finding, percent
 from femgear.gears.pair import BRANCH, GearSet
 from femgear.report.tables import Block, Marks, tabulate
 from femgear.system.bearing_friction import OIL_BATH, FrictionFactors, Kind, friction_load, load_factor
@@ -199,7 +199,7 @@ def planet_bearing_rows(data: Any, marks: Marks, of: tuple[str, ...] = ("life",)
         hours, short = f"{life[at]:.4g} h", life[at] < float(data.attrs.get("required_hours", 0.0))
         text = f"{marks(hours, 'W-LIFE', of=of) if short else hours}, {data['planet_bearing'].values[at]}"
         case = data["load_case"].values[most]
-        yield "shortest L10 of the planets' bearings", f"{text}: {share[most]:.0%} of the damage in {case}"
+        yield "shortest L10 of the planets' bearings", f"{text}: {percent(share[most])} of the damage in {case}"
 
 
 def planet_bearing_findings(data: Any) -> Iterator[Finding]:
@@ -222,7 +222,7 @@ def describe_planet_bearings(data: Any) -> Iterator[Block]:
     def most(number: int) -> str:
         share = data["planet_bearing_damage_share"].values[:, number]
         at = int(share.argmax())
-        return f"{data['load_case'].values[at]} ({share[at]:.0%})" if share.any() else "-"
+        return f"{data['load_case'].values[at]} ({percent(share[at])})" if share.any() else "-"
 
     columns = {
         "bearing of": lambda i: str(data["planet_bearing"].values[i]),

@@ -27,7 +27,7 @@ from femgear.contact.bodies import flank_widths
 from femgear.contact.peaks import FEWEST, peak_doubt, tooth_pair_codes
 from femgear.contact.root_stress import BACK, LOADED, NOTCH_REACH, RootCycle
 from femgear.contact.slices import PARTS as SLICES
-from femgear.findings import DOUBT, Finding, findings_in
+from femgear.findings import DOUBT, Finding, findings_in, percent
 from femgear.gears.checks import check_set, tip_clearances
 from femgear.gears.deviations import check_deviations
 from femgear.gears.friction import path_speeds
@@ -759,7 +759,7 @@ def static_warnings(data: xr.Dataset) -> Iterator[Finding]:
     elif doubt > LARGEST_PEAK_DOUBT:
         reach = (
             "between the positions transmission errors, mesh stiffnesses or load shares may go on by "
-            f"{doubt:.0%} of their peak to peak"
+            f"{percent(doubt)} of their peak to peak"
         )
         yield Finding("W-POSITIONS", "static.positions", reach, remedy="take more positions")
     if ((force > 0) & (pressure <= 0)).any():
@@ -893,8 +893,8 @@ def _narrow(data: xr.Dataset) -> Finding:
     softer, aligned, slope = (factor / modules for factor in _SPUR_ENDS.values())
     text = (
         f"teeth are {modules:.3g} modules wide and their ends mirror planes: free ends make meshes about "
-        f"{softer:.1%} softer, raise K_Hbeta of aligned flanks to about {1.0 + aligned:.2f} and lower "
-        f"K_Hbeta - 1 under slopes by about {slope:.0%}"
+        f"{percent(softer, 1)} softer, raise K_Hbeta of aligned flanks to about {1.0 + aligned:.2f} and lower "
+        f"K_Hbeta - 1 under slopes by about {percent(slope)}"
     )
     return Finding("W-ENDS", "static.slices", text, remedy="take K_Hbeta and stiffness with that margin")
 

@@ -8,11 +8,11 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import asdict, fields
-from typing import Any
+from typing import Any, get_args
 
 from femgear.errors import FemgearError
 from femgear.findings import Finding, as_data, by_severity
-from femgear.stages.judgements import Judgement
+from femgear.stages.judgements import Judgement, State
 from femgear.stages.protocol import Train
 
 VERSION = 1
@@ -26,9 +26,7 @@ def _object(**properties: Mapping[str, Any]) -> dict[str, Any]:
 
 
 _FINDING = _object(**{field.name: _TEXT for field in fields(Finding)})
-_JUDGEMENT = _object(
-    **{field.name: _TEXT for field in fields(Judgement)} | {"state": {"enum": ["good", "look", "bad", "open"]}}
-)
+_JUDGEMENT = _object(**{field.name: _TEXT for field in fields(Judgement)} | {"state": {"enum": list(get_args(State))}})
 _FIGURE = _object(name=_TEXT, value={"type": ["number", "null"]}, unit=_TEXT, shown=_TEXT)
 SCHEMA = {
     "$schema": "https://json-schema.org/draft/2020-12/schema",

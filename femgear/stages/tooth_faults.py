@@ -14,7 +14,7 @@ from femgear.case.gear_set import planetary_set, set_deviations
 from femgear.contact.flank_pairs import RIGHT, acting_flanks
 from femgear.contact.repeated_positions import on_faulty_tooth
 from femgear.contact.windows import pair_paths
-from femgear.findings import FAULT, Finding
+from femgear.findings import FAULT, Finding, percent
 from femgear.gears.deviations import rotational_symmetry
 from femgear.gears.faults import BrokenTip, Crack, MissingTooth, Spall, ToothFault
 from femgear.gears.pair import BRANCH
@@ -66,7 +66,7 @@ def _out_of_mesh(case: Any, gears: GearSet) -> Iterator[Finding]:
         meshes = left.any(axis=2)
         carried = np.all([meshes[rows] for rows in gears.kind_rows], axis=0).any(axis=0)
         if not carried.all():
-            share = f"{(~carried).mean():.0%} of the mesh periods"
+            share = f"{percent((~carried).mean())} of the mesh periods"
             text = f"{len(faults)} missing teeth: in {share} nothing carries the torque"
             remedy = "leave teeth that mesh in turn with one planet or another"
             yield Finding("W-FAULT", f"{gear.name}.fault", text, severity=FAULT, remedy=remedy)
@@ -234,7 +234,7 @@ def _error_effect(static: Any, periods: int) -> str:
     usual, worst = np.median(of_periods, axis=1), of_periods.max(axis=1)
     mesh = int((worst - usual).argmax())
     if worst[mesh] < (1.0 + _SHOWS) * usual[mesh]:
-        return f"no mesh period has {_SHOWS:.0%} more transmission error than the others"
+        return f"no mesh period has {percent(_SHOWS)} more transmission error than the others"
     # that of the verdict, with the peaks between positions where they are known
     whole = static.get("ste_peak_to_peak", static["ste"].max("position") - static["ste"].min("position"))
     return f"transmission error {1e6 * float(whole[mesh]):.3g} in place of {1e6 * usual[mesh]:.3g} µm"
@@ -248,7 +248,7 @@ def _share_effect(static: Any) -> str:
     if abs(share[planet, position] - usual[planet]) < _SHOWS * usual[planet]:
         return "planets share the load as without it"
     name = f"planet {static['planet'].values[planet]}"
-    return f"{name} carries {share[planet, position]:.1%} in place of {usual[planet]:.1%} of the torque"
+    return f"{name} carries {percent(share[planet, position], 1)} in place of {percent(usual[planet], 1)} of the torque"
 
 
 def _line_effect(results: Any) -> Iterator[str]:

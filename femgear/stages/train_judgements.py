@@ -48,6 +48,8 @@ _TO_A_HOUSING = "femgear casing CASE makes a gearbox of it, in a casing with sen
 _NO_METHOD = NotRated("ISO 6336 has no safety of these teeth", "the verdict in numbers says why")
 _RESPONSES = "dynamics", "response", "runup", "branch"
 """Stages with motion."""
+BY_ALL_STAGES = "a run of all stages computes it; where it has no such stage a gearbox has (femgear gearbox CASE)"
+"""What gives a motion to a case with speeds."""
 
 
 def set_judgements(results: Any) -> Iterator[Judgement]:
@@ -57,7 +59,9 @@ def set_judgements(results: Any) -> Iterator[Judgement]:
         # nothing louder is said of a set without a level
         smooth = judgement.question == SMOOTH and judgement.state == "good"
         yield replace(judgement, sentence=f"It runs smoothly: {judgement.limit}") if smooth else judgement
-    yield judge_noise("no level: this kind of case has no housing", _largest_force(results), open_words=_TO_A_HOUSING)
+    yield judge_noise(
+        "no level: this kind of case has no housing", _largest_force(results), open_words=_TO_A_HOUSING, computed=False
+    )
     yield judge_numbers(results.findings, results.manifest.complete)
 
 
@@ -106,7 +110,8 @@ def judge_teeth(results: Any, rating: Rating | None, dynamic: np.ndarray | None 
         unknown = without_life(results.life, case.gear_names)
         yield from judge_lives(parts, required_life(case.operation), findings, unknown)
     yield from judge_heat(results)
-    yield judge_smoothness(_motion(results, dynamic), results, _RESPONSES)
+    remedy = BY_ALL_STAGES if case.operation.speeds else "operation.speeds gives it"
+    yield judge_smoothness(_motion(results, dynamic), results, _RESPONSES, remedy)
 
 
 def _judge_faults(results: Any) -> Iterator[Judgement]:

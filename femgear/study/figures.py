@@ -7,6 +7,7 @@ from textwrap import fill
 
 import numpy as np
 
+from femgear.findings import percent
 from femgear.report.style import (
     BLACK,
     BLUE,
@@ -87,7 +88,7 @@ def relief_contours(amounts, lengths, ratios, torques, *, optimum=None, design=N
         if ratio.min() < quarter < ratio.max():
             ax.contour(lengths, 1e6 * amounts, ratio, levels=[quarter], colors=[COLOURS[4]], linewidths=2.0)
             # a contour has no legend entry of its own
-            ax.plot([], [], color=COLOURS[4], linewidth=2.0, label=f"{quarter:.0%} of unmodified")
+            ax.plot([], [], color=COLOURS[4], linewidth=2.0, label=f"{percent(quarter)} of unmodified")
         if optimum is not None:
             _mark(ax, optimum, at_this_torque=design is None or np.isclose(torque, design), design=design)
         label(ax, "length [two-pair contact]", title=f"{torque:g} N m")

@@ -12,6 +12,7 @@ import numpy as np
 from femgear.case.gear_set import need_set
 from femgear.case.planetary import Case
 from femgear.errors import CaseError
+from femgear.findings import percent
 from femgear.housing.sensor import stored_lines
 from femgear.report.response import stored_harmonics
 from femgear.report.style import save_figure
@@ -487,7 +488,9 @@ def _check(best_found: Optimum, data: Case, folder: Path, speeds: Any, rough: Op
     errors = [results.static["ste_overall"].values[0] for results in runs]
     course = [value / (rough.before[rough.problem.objective.name] or 1.0) for value in rough.course]
     save_figure(before_and_after(position, errors, **dynamic, costs=course), folder / _CHECK[1])
-    shown = tuple((n, f"{b:.5g} {unit}", f"{a:.5g} {unit}", f"{a / b - 1:+.1%}") for n, b, a, unit in rows)
+    shown = tuple(
+        (n, f"{b:.5g} {unit}", f"{a:.5g} {unit}", percent(a / b - 1, 1, signed=True)) for n, b, a, unit in rows
+    )
     return Block("Computed anew: 128 positions, 32 elements along a flank", _COLUMNS, shown, tuple(notes))
 
 

@@ -19,7 +19,7 @@ import numpy as np
 
 from femgear.case.planetary import Case
 from femgear.errors import CaseError, FemgearError, StorageError
-from femgear.findings import Finding, as_text, findings_in, tell
+from femgear.findings import Finding, as_text, findings_in, percent, tell
 from femgear.report.style import BLUE, VERMILION, label, legend_below, new_figure, save_figure
 from femgear.report.tables import Block, Marks
 from femgear.stages.protocol import Progress, one_blas_thread, silent
@@ -159,7 +159,7 @@ def _findings_of_peaks(data: xr.Dataset, missed: Mapping[str, float]) -> Iterato
     name = max(missed, key=missed.__getitem__)
     if missed[name] > LARGEST_PEAK_DOUBT:
         text = (
-            f"{data.attrs['positions']} positions of a mesh period miss up to {missed[name]:.0%} of the "
+            f"{data.attrs['positions']} positions of a mesh period miss up to {percent(missed[name])} of the "
             f"{name.replace('_', ' ')} of the samples that were solved again"
         )
         yield Finding("W-POSITIONS", "--positions", text, remedy="take more positions")
@@ -390,7 +390,7 @@ def figure(data: xr.Dataset, columns: Columns):
         ax.hist(values, _BINS, range=ends, weights=100.0 / count * weight, color=BLUE)
         for part, dash in ((0.5, "-"), (0.95, "--"), (0.99, ":")):
             at = float(of_all.sel(quantile=part))
-            ax.axvline(at, color=VERMILION, linestyle=dash, label=f"{part:.0%} of the samples below")
+            ax.axvline(at, color=VERMILION, linestyle=dash, label=f"{percent(part)} of the samples below")
         label(ax, name, "samples [%]")
     legend_below(figure_, columns=4)
     return figure_
@@ -444,13 +444,13 @@ def _described(data: xr.Dataset, ideal: dict[str, np.ndarray], limits: Iterable[
         "others where the set without drawn errors has its peaks, and the end; over the "
         f"{data.attrs['turn']} of a turn of the carrier these samples have {' and '.join(turns)}",
         f"with the peaks of the samples themselves, as femgear run has them, {' and '.join(between)}",
-        f"a planet loses its load in {float(data.share_that_opens):.2%} of the samples",
+        f"a planet loses its load in {percent(float(data.share_that_opens), 2)} of the samples",
         f"worst.toml (femgear run --only static): sample {worst}, STE {of_worst:.6g} um; "
         f"largest share: sample {data.attrs['largest']}",
         *limits,
         *marks.notes,
     )
-    shares = tuple(f"{q:.0%}" for q in QUANTILES)
+    shares = tuple(percent(q) for q in QUANTILES)
     title = f"{data.attrs['samples']} samples, seed {data.attrs['seed']}"
     blocks = [Block(title, ("number", "ideal", *shares, "largest"), tuple(rows), notes)]
     if missed:

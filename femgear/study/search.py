@@ -29,7 +29,7 @@ from femgear.case.gear_set import set_deviations
 from femgear.case.planetary import Case
 from femgear.case.tooth_friction import no_acting_friction
 from femgear.errors import CaseError, ContactError, ConvergenceError, FemgearError, StorageError
-from femgear.findings import Finding, tell
+from femgear.findings import Finding, percent, tell
 from femgear.stages.key_figures import DECIBEL
 from femgear.stages.protocol import Progress, one_blas_thread
 from femgear.stages.static import record_positions, static_supports
@@ -589,7 +589,7 @@ def comparison_rows(optimum: Optimum) -> Iterator[tuple[str, str, str, str]]:
     """Write name, before, after and change of every reported quantity."""
     for quantity in optimum.problem.reported:
         before, after = optimum.before[quantity.name], optimum.after[quantity.name]
-        change = f"{after / before - 1.0:+.1%}" if before else ""
+        change = percent(after / before - 1.0, 1, signed=True) if before else ""
         change = f"{after - before:+.2f} dB" if quantity.dimension.si == DECIBEL.si else change
         yield quantity.name, quantity.show(before), quantity.show(after), change
 

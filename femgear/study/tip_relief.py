@@ -15,6 +15,7 @@ from femgear.case.planetary import Case
 from femgear.case.quantities import TORQUE, to_si
 from femgear.contact.supports import RIGID
 from femgear.errors import CaseError
+from femgear.findings import percent
 from femgear.gears.planetary import PlanetarySet
 from femgear.report.style import family, save_figure
 from femgear.report.tables import Block
@@ -218,7 +219,7 @@ def _described_grid(inputs: np.ndarray, grid: ReliefGrid, mesh: str) -> Block:
         a, b = np.unravel_index(grid.peak_to_peak[t].argmin(), grid.peak_to_peak[t].shape)
         numbers = (grid.unmodified[t] * 1e6, grid.peak_to_peak[t, a, b] * 1e6)
         place = f"{grid.amounts[a] * 1e6:.2f}", f"{grid.lengths[b]:.3f}"
-        rows.append((f"{torque:g}", *place, *(f"{x:.4f}" for x in numbers), f"{grid.ratio[t, a, b]:.1%}"))
+        rows.append((f"{torque:g}", *place, *(f"{x:.4f}" for x in numbers), percent(grid.ratio[t, a, b], 1)))
     header = ("torque [N m]", "relief [um]", "length [1]", "before, p-p [um]", "STE p-p [um]", "over before")
     return Block(f"Best points of the grid, {mesh} meshes", header, tuple(rows))
 
@@ -230,7 +231,8 @@ def _described_optimum(
     pairs = list(zip(names, runs.peak_to_peak[..., 0].T, strict=True))
     pairs += [("sun to ring", runs.overall[:, 0])] if len(names) > 1 else []
     rows = tuple(
-        (name, f"{1e6 * before:.4f}", f"{1e6 * after:.4f}", f"{after / before:.1%}") for name, (before, after) in pairs
+        (name, f"{1e6 * before:.4f}", f"{1e6 * after:.4f}", percent(after / before, 1))
+        for name, (before, after) in pairs
     )
     notes = [
         f"{best.amount * 1e6:.3f} um over {best.length:.3f} lengths of two-pair contact, {best.evaluations} mesh "

@@ -18,6 +18,7 @@ from femgear.case.dependencies import Steps
 from femgear.case.fault_sections import MOST_DEPTH
 from femgear.case.quantities import SPEED, to_si
 from femgear.errors import CaseError
+from femgear.findings import percent
 from femgear.report.tables import Block, tabulate
 from femgear.stages.protocol import Progress, one_blas_thread, silent
 from femgear.stages.wear import MeshingTeeth, WornFlank, wear_entries, with_more_wear, worn_flanks
@@ -234,14 +235,16 @@ def describe_wear(worn: WornCase, request: WearRequest) -> Block:
         "flank": lambda flank: flank.flank,
         "deepest [um]": lambda flank: f"{1e6 * flank.depth.max():.4g}",
         "at diameter [mm]": lambda flank: f"{2e3 * flank.radius[flank.depth.argmax()]:.5g}",
-        "half the steps": lambda flank: f"{worn.change(flank):.2%}" if worn.half else "-",
+        "half the steps": lambda flank: percent(worn.change(flank), 2) if worn.half else "-",
     }
     steps = f"{request.steps} step{'s' * (request.steps > 1)}"
     notes = [f"{request.hours:g} h with k = {request.coefficient:g} m^2/N in {steps}; of planets the deepest"]
     if not worn.half:
         notes.append("ONE STEP: loads do not follow the wear, and nothing shows how far that matters; use --steps 4")
     elif (change := max(map(worn.change, deepest))) > _COARSE:
-        notes.append(f"NOT CONVERGED: half the steps change depths by {change:.1%} of the deepest; use more --steps")
+        notes.append(
+            f"NOT CONVERGED: half the steps change depths by {percent(change, 1)} of the deepest; use more --steps"
+        )
     else:
-        notes.append(f"half the steps change no depth by more than {change:.2%} of the deepest of its flank")
+        notes.append(f"half the steps change no depth by more than {percent(change, 2)} of the deepest of its flank")
     return tabulate("Wear of the flanks", deepest, columns, notes)

@@ -9,6 +9,7 @@ from femgear.case.dependencies import modal_entries, static_entries
 from femgear.case.gear_set import planetary_set
 from femgear.case.tooth_friction import acting_friction, friction_coefficient, friction_findings, no_acting_friction
 from femgear.errors import CaseError
+from femgear.findings import percent
 from femgear.gears.friction import path_speeds, schlenk_friction
 from femgear.trains.reading import read_case, with_values
 
@@ -110,7 +111,7 @@ def test_a_coefficient_that_other_speeds_would_not_have_is_told():
     )
     (finding,) = friction_findings(case, planetary_set(case))
     assert finding.code == "W-FRICTION" and finding.severity == "doubt"
-    assert f"{(250 / 3100) ** 0.2 - 1:+.0%}" in finding.text and "3100 rpm" in finding.text
+    assert f"{percent((250 / 3100) ** 0.2 - 1, signed=True)}" in finding.text and "3100 rpm" in finding.text
     for change in ({"operation.speeds": ["250 rpm", "260 rpm"]}, {"losses": ACTS}, {"operation.torque": "0 N m"}):
         other = with_values(case, change)
         assert not list(friction_findings(other, planetary_set(other)))

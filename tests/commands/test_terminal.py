@@ -69,7 +69,7 @@ def test_progress_tells_per_cent_count_and_time_left(monkeypatch, capsys):
         progress("sound", 10, 40)
     shown = re.sub("\x1b\\[[^a-zA-Z]*[a-zA-Z]", "", capsys.readouterr().err)
     last = [line for line in re.split("[\r\n]+", shown) if "sound" in line][-1]
-    assert "25%" in last and "10/40" in last and last.count(":") >= 2 and len(last.rstrip()) <= 80
+    assert "25 %" in last and "10/40" in last and last.count(":") >= 2 and len(last.rstrip()) <= 80
 
 
 def test_progress_is_one_line_a_stage_in_a_file(capsys):

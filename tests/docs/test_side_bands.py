@@ -34,7 +34,7 @@ def test_command_gives_the_table_of_the_page(tmp_path):
     ]
     shown = PAGE.split("| verdict | why |\n")[1].split("\n\n")[0].splitlines()[1:]
     assert shown == made
-    assert "by chance in 28% of cases at most" in done.stdout
+    assert "by chance in 28 % of cases at most" in done.stdout
 
 
 @pytest.mark.slow

@@ -145,7 +145,7 @@ def transient(
         ({"energy": np.nan}, ["[W-BALANCE] the balance of energy misses nan"]),
         (
             {"pulling": 0.25},
-            ["[W-PULL] with bending: a-b pulls for 25.00% of the time, with up to 0.2 kN"],
+            ["[W-PULL] with bending: a-b pulls for 25.00 % of the time, with up to 0.2 kN"],
         ),
     ],
 )

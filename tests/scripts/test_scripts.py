@@ -212,7 +212,7 @@ def test_load_sharing_with_gaps(quick_case, tmp_path):
     arguments = ("--gap", "0 um", "--gap", "1 um", "--gap", "40 um", "--planet", "2")
     done = run("load_sharing.py", quick_case, *arguments, "-o", tmp_path, folder=tmp_path)
     assert done.returncode == 0, done.stderr
-    assert "gap 40 um: planet 2 carries nothing over 100% of the cycle" in done.stdout
+    assert "gap 40 um: planet 2 carries nothing over 100 % of the cycle" in done.stdout
     assert is_png(tmp_path / "load_sharing.png") and is_png(tmp_path / "tooth_loads.png")
     data = table(tmp_path / "load_sharing.csv")
 

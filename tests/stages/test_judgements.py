@@ -55,6 +55,8 @@ def test_strength_without_limits_is_open_and_half_of_it_deserves_a_look():
     open_ = judge_strength(None, None, StrengthSection(), "root 130 MPa, pressure 736 MPa")
     assert (open_.state, open_.answer) == ("open", "root 130 MPa, pressure 736 MPa")
     assert "material.treatment" in open_.limit and open_.words == "○ no limit"
+    nothing = judge_strength(None, None, StrengthSection())
+    assert (nothing.state, nothing.words) == ("absent", "○ not computed") and "material.treatment" in nothing.limit
     half = judge_strength(None, FLANK, StrengthSection())
     assert half.state == "look" and half.limit.endswith("S_F is not rated")
     doubt = Finding("W-FACE-LOAD", "", "text", severity=DOUBT)
@@ -211,37 +213,46 @@ class Files(dict):
     findings: tuple = ()
 
 
+SPEEDS = "operation.speeds gives it"
+
+
 def test_a_run_is_smooth_unless_teeth_part_or_motions_grow():
     smooth = Files(dynamics=xr.Dataset({"drive_contact": ("speed", [1.0, 1.0]), "stable": ("speed", [1, 1])}))
-    assert judge_smoothness("", smooth, ("dynamics",)).state == "good"
-    assert judge_smoothness("", smooth, ("branch",)).state == "open"
+    assert judge_smoothness("", smooth, ("dynamics",), SPEEDS).state == "good"
+    still = judge_smoothness("", smooth, ("branch",), SPEEDS)
+    assert (still.state, still.words, still.limit) == ("absent", "○ not computed", SPEEDS)
     parted = Files(branch=xr.Dataset({"drive_contact": ("point", [1.0, 0.9]), "stable": ("point", [1, 0])}))
-    judgement = judge_smoothness("K_v 1.2", parted, ("dynamics", "branch"))
+    judgement = judge_smoothness("K_v 1.2", parted, ("dynamics", "branch"), SPEEDS)
     assert judgement.state == "look" and judgement.limit == "teeth part, motions are not stable"
     # what is not determined is not judged
-    assert judge_smoothness("", Files(branch=xr.Dataset({"stable": ("point", [1, -1])})), ("branch",)).state == "good"
+    assert (
+        judge_smoothness("", Files(branch=xr.Dataset({"stable": ("point", [1, -1])})), ("branch",), SPEEDS).state
+        == "good"
+    )
     back = Files(branch=xr.Dataset({"back_contact": ("point", [0.0, 0.1])}))
-    assert judge_smoothness("", back, ("branch",)).answer == "teeth press on their back flanks"
+    assert judge_smoothness("", back, ("branch",), SPEEDS).answer == "teeth press on their back flanks"
     pulled = Files(dynamics=xr.Dataset({"level": ("speed", np.ones(2))}))
     pulled.findings = (Finding("W-PULL", "", "it pulls"),)
-    assert judge_smoothness("", pulled, ("dynamics",)).answer == "teeth part"
+    assert judge_smoothness("", pulled, ("dynamics",), SPEEDS).answer == "teeth part"
     pulled.findings = (Finding("W-TAIL", "", "it ends short", severity=DOUBT),)
-    short = judge_smoothness("", pulled, ("dynamics",))
+    short = judge_smoothness("", pulled, ("dynamics",), SPEEDS)
     assert (short.state, short.answer) == (
         "look",
         "mesh forces may change: too few harmonics or side bands were taken",
     )
     pulled.findings = (Finding("W-OPEN", "", "planet 2 carries nothing"),)
-    unloaded = judge_smoothness("", pulled, ("dynamics",))
+    unloaded = judge_smoothness("", pulled, ("dynamics",), SPEEDS)
     assert (unloaded.state, unloaded.answer) == ("look", "a planet carries nothing at some positions")
     # of motions whose stability nothing tells nothing is said
     pulled.findings = ()
-    assert judge_smoothness("", pulled, ("dynamics",)).answer == "teeth stay in contact"
+    assert judge_smoothness("", pulled, ("dynamics",), SPEEDS).answer == "teeth stay in contact"
 
 
 def test_a_level_without_a_limit_is_judged_by_resonances_alone():
     assert judge_noise("1 m/s²", "so", "mode 3 meets mesh harmonic 2").state == "look"
     assert judge_noise("1 m/s²", "so").state == "open"
+    unheard = judge_noise("no level", "", "", "a casing gives one", doubts="doubt: many", computed=False)
+    assert (unheard.state, unheard.words, unheard.limit) == ("absent", "○ not computed", "a casing gives one")
 
 
 def test_a_doubtful_level_deserves_a_look_with_and_without_a_limit():
@@ -253,7 +264,7 @@ def test_a_line_beside_a_mode_is_the_resonance_of_a_level_of_which_it_makes_half
     modes = np.array([0.0, 1200.0, 3780.0])
     words = resonance_of_line("mesh harmonic 1 at 3,750 Hz", 3750.0, modes, 0.98)
     # 3750/3780 - 1 = -0.79 %
-    assert words == "mesh harmonic 1 at 3,750 Hz, 0.8 % below mode 3 at 3,780 Hz, makes 98% of the power"
+    assert words == "mesh harmonic 1 at 3,750 Hz, 0.8 % below mode 3 at 3,780 Hz, makes 98 % of the power"
     assert "9.9 % above mode 2" in resonance_of_line("a line", 1319.0, modes, 0.25)
     # half of the level is a quarter of its power
     assert not resonance_of_line("a line", 3750.0, modes, 0.24)

@@ -45,9 +45,9 @@ def data():
 
 def test_the_verdict_names_what_fails_first_and_by_which_load_case(data):
     (finding,) = life_findings(data)
-    assert finding.severity == "fault" and "gear 2" in finding.text and "75% of the damage in start" in finding.text
+    assert finding.severity == "fault" and "gear 2" in finding.text and "75 % of the damage in start" in finding.text
     (_, life), (_, root), (_, flank) = life_rows(data, Marks([finding]))
-    assert life == "400 h†, root of gear 2: 75% of the damage in start"
+    assert life == "400 h†, root of gear 2: 75 % of the damage in start"
     # what fails too soon is marked alone
     assert root.startswith("0.90†, root of gear 2: damage 2.5") and flank.startswith("1.60, flank of gear 1: damage 0")
 
@@ -88,7 +88,7 @@ def test_tables_have_a_row_a_root_and_a_row_a_load_case(data):
     assert lives.rows[1][1:3] == ("400", "2.5") and lives.rows[2][-1] == "-"
     (damage,) = describe_damage(data)
     assert [row[:2] for row in damage.rows] == [("start", "0.1"), ("run", "0.9")]
-    assert "75.00%" in damage.rows[0] and not list(describe_damage(data.isel(load_case=[0])))
+    assert "75.00 %" in damage.rows[0] and not list(describe_damage(data.isel(load_case=[0])))
 
 
 def test_hours_in_words():

@@ -110,7 +110,7 @@ def test_effects_of_a_fault_are_those_of_its_mesh_periods():
     run = SimpleNamespace(case=case, stages=("static", "housing"), static=static, housing=housing)
     error, shares, line = fault_effects(run)
     assert error == "transmission error 3 in place of 2 µm"
-    assert shares == "planet 1 carries 28.0% in place of 33.3% of the torque"
+    assert shares == "planet 1 carries 28.0 % in place of 33.3 % of the torque"
     assert line == "new lines, at 40 Hz 20 dB below the largest"
     static["ste_peak_to_peak"] = ("mesh", [3.4e-6, 1e-6])
     assert next(fault_effects(run)) == "transmission error 3.4 in place of 2 µm"
@@ -118,7 +118,7 @@ def test_effects_of_a_fault_are_those_of_its_mesh_periods():
     static["ste"][0, 2:4] = usual
     static["load_share"][:] = 1.0 / 3.0
     assert list(fault_effects(run)) == [
-        "no mesh period has 2% more transmission error than the others",
+        "no mesh period has 2 % more transmission error than the others",
         "planets share the load as without it",
         "no line at the sensor is new",
     ]

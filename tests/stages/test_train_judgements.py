@@ -8,7 +8,7 @@ import pytest
 import xarray as xr
 
 from femgear.stages.judgements import HEAT, QUIET, SMOOTH, STRONG, SURE
-from femgear.stages.train_judgements import judge_teeth, set_judgements
+from femgear.stages.train_judgements import BY_ALL_STAGES, judge_teeth, set_judgements
 from femgear.trains.reading import read_case, with_values
 
 CASES = Path(__file__).parents[2] / "cases"
@@ -34,9 +34,12 @@ def static():
 def test_the_error_of_either_kind_of_mesh_is_the_largest(static):
     case = read_case(CASES / "planetary_27_40_108.toml")
     strength, smooth = judge_teeth(Files(case, static=static), None)
-    assert (strength.question, strength.state) == (STRONG, "open")
+    assert (strength.question, strength.state) == (STRONG, "absent")
     assert (smooth.question, smooth.answer) == (SMOOTH, "transmission error 1.5 and 0.25 µm (sun-planet, planet-ring)")
-    assert smooth.state == "open"  # without motion
+    assert (smooth.state, smooth.limit) == ("absent", BY_ALL_STAGES)  # this run has no motion
+    still = case.model_copy(update={"operation": case.operation.model_copy(update={"speeds": ()})})
+    *_, smooth = judge_teeth(Files(still, static=static), None)
+    assert (smooth.state, smooth.limit) == ("absent", "operation.speeds gives it")
     *_, in_housing = judge_teeth(Files(case, static=static), None, np.array([1.092, 1.065]))
     assert (
         ", dynamic factor K_v 1.09 and 1.06 (" in in_housing.answer
@@ -50,7 +53,7 @@ def test_a_pair_with_limits_is_rated_and_has_no_level():
     judged = {judgement.question: judgement for judgement in set_judgements(Files(case))}
     assert list(judged) == [STRONG, SMOOTH, QUIET, SURE] and HEAT not in judged
     assert judged[STRONG].state == "bad" and "S_H at least 3" in judged[STRONG].limit
-    assert judged[QUIET].state == "open" and "femgear casing" in judged[QUIET].limit
+    assert judged[QUIET].state == "absent" and "femgear casing" in judged[QUIET].limit
     enough = with_values(case, {"strength.required_flank_safety": 0.1})
     strong = next(set_judgements(Files(enough)))
     assert strong.state == "good" and strong.limit.endswith("K_v, K_Hβ, K_Hα taken as 1")
@@ -92,4 +95,4 @@ def test_the_error_of_helical_meshes_is_that_of_the_slices(static):
     modes = xr.Dataset({"helical_ste": (("mesh", "position"), curve)}, {"mesh": static["mesh"]})
     runs = {"static": static, "modes": modes}, {"static": static}
     answers = [list(judge_teeth(Files(case, **data), None))[-1].answer for data in runs]
-    assert answers == ["transmission error 0.25 and 0.0625 µm (sun-planet, planet-ring)", "not known"]
+    assert answers == ["transmission error 0.25 and 0.0625 µm (sun-planet, planet-ring)", "no motion"]

@@ -10,7 +10,7 @@ def test_the_optimum_is_marked_under_its_torque_alone():
     ratios = np.array([np.full((3, 3), 0.8), [[0.9, 0.6, 0.1], [0.7, 0.5, 0.4], [0.9, 0.8, 0.7]]])
     figure = relief_contours(amounts, lengths, ratios, [50.0, 100.0], optimum=(3e-6, 1.1), design=100.0)
     names = [ax.get_legend_handles_labels()[1] for ax in figure.axes[:2]]
-    assert names == [["chosen for 100 N m"], ["25% of unmodified", "optimum at 100 N m"]]
+    assert names == [["chosen for 100 N m"], ["25 % of unmodified", "optimum at 100 N m"]]
     (legend,) = figure.legends
     assert {text.get_text() for text in legend.get_texts()} == {name for one in names for name in one}
     faces = [ax.lines[-1].get_markerfacecolor() for ax in figure.axes[:2]]

@@ -64,7 +64,7 @@ def test_numbers_whose_peaks_the_positions_miss_are_marked():
         data[f"{name}_exact"], data[f"{name}_between"] = ("check", [1.0, 2.0]), ("check", [1.0, 2.0 * more])
     missed = sample_results._missed_peaks(data)
     (finding,) = sample_results._findings_of_peaks(data, missed)
-    assert finding.code == "W-POSITIONS" and "miss up to 9% of the transmission error" in finding.text
+    assert finding.code == "W-POSITIONS" and "miss up to 9 % of the transmission error" in finding.text
     ideal = dict.fromkeys(SHOWN, np.ones(1))
     bare = sample_results._described(data, ideal, ())[0]
     assert "†" not in str(bare.rows)

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from femgear.case.level_limits import limit_at
-from femgear.findings import CATALOGUE
+from femgear.findings import CATALOGUE, percent
 from femgear.report.tables import Marks, is_bound, level_change_at
 from femgear.stages.assumptions import most_decisive
 from femgear.stages.judgements import (
@@ -63,21 +63,23 @@ def _noise(results: Any) -> Judgement:
     hertz = order * carrier / (2.0 * np.pi)
     share = 0.5 * (size[line] / level[at]) ** 2 if level[at] > 0.0 else 0.0
     origin = _origin(round(order), results.case.ring.teeth) or f"{order:g} per carrier turn"
-    place = ", ".join(filter(None, (origin, _nearest_mode(results, hertz))))
-    main = (
-        f"{'its' if share >= _STANDS_OUT else 'no line stands out, the'} largest line, {hertz:,.0f} Hz ({place}), makes"
-    )
-    main += f" {share:.0%} of the power"
-    sentence = f"At {speed:,.4g} rpm the housing has {_bound_in_words(size_words)}: {main}"
+    line_words = f"{origin} at {hertz:,.0f} Hz"
+    resonance, cause = "", ""
+    if "runup" in results.stages:
+        resonance, cause = _resonance(results, speed)
+    elif "modes" in results.stages:
+        resonance = resonance_of_line(line_words, hertz, results.modes["frequency"].values, share)
+    if not cause:
+        place = ", ".join(filter(None, (origin, _nearest_mode(results, hertz))))
+        which = "its" if share >= _STANDS_OUT else "no line stands out, the"
+        cause = f"{which} largest line, {hertz:,.0f} Hz ({place}), makes {percent(share)} of the power"
+    sentence = f"At {speed:,.4g} rpm the housing has {_bound_in_words(size_words)}: {cause}"
     if decisive := most_decisive(results):
         sentence += f", with half and twice of what is assumed: {decisive}"
-    margins, resonance, levels = tuple(_margins(results)), "", [size_words]
+    margins, levels = tuple(_margins(results)), [size_words]
     if "runup" in results.stages:
         levels.append(loudest(results.runup, marks))
         sentence += f". Loudest of the run-up: {_bound_in_words(levels[-1])}"
-        resonance = _resonance(results.runup)
-    elif "modes" in results.stages:
-        resonance = resonance_of_line(f"{origin} at {hertz:,.0f} Hz", hertz, results.modes["frequency"].values, share)
     # a bound has no mark: it is one itself
     doubts = [*([CATALOGUE["W-EXCITATION"].words] if any(map(is_bound, levels)) else []), *marks.words]
     rests_on = estimates_words(results.findings)
@@ -123,22 +125,36 @@ def _nearest_mode(results: Any, hertz: float) -> str:
     return f"near mode {mode + 1}: {results.modes['kind'].values[mode]}"
 
 
-def _resonance(runup: Any) -> str:
-    """Write the resonance that makes most of the level at a speed of operation; empty where none does.
+def _resonance(results: Any, loudest_speed: float) -> tuple[str, str]:
+    """Write the resonance that makes most of a level of operation, and the same as the cause in the sentence.
 
     It is of all lines of a mesh harmonic: its share may be more than that of the largest line, of another harmonic.
+    That of the loudest speed of operation [rpm] goes before all others, and is alone the cause there.
+
+    Returns
+    -------
+    tuple of str
+        Of the card and of the sentence; the first is empty where no resonance makes half of a level, the second where
+        none does at the loudest speed.
     """
+    runup = results.runup
     if "operating_alone" not in runup:
-        return ""
+        return "", ""
     alone, distance = runup["operating_alone"].values, runup["distance"].values
-    level = np.interp(runup["operating_speed"].values, runup["speed"].values, runup["level"].values)
+    speeds = runup["operating_speed"].values
+    level = np.interp(speeds, runup["speed"].values, runup["level"].values)
     makes = np.where((np.abs(distance) <= NEAR_RESONANCE) & (alone >= MAKES_LEVEL * level), alone / level, 0.0)
     if not makes.any():
-        return ""
-    at = int(makes.argmax())
+        return "", ""
+    at_loudest = np.where(np.isclose(speeds, loudest_speed), makes, 0.0)
+    at = int((at_loudest if at_loudest.any() else makes).argmax())
     mode, harmonic = int(runup["mode"].values[at]), int(runup["mesh_harmonic"].values[at])
-    speed, side = float(runup["operating_speed"].values[at]), "below" if distance[at] < 0.0 else "above"
-    meeting = f"mode {mode} meets mesh harmonic {harmonic}, {abs(distance[at]):.1f} % {side} {speed:,.4g} rpm"
-    share = float(makes[at]) ** 2
-    power = f"{share:.0%} of the power" if share < 1.0 else "as loud as all lines"
-    return f"{meeting}: all lines of that harmonic by that mode are {power}"
+    speed, side = float(speeds[at]), "below" if distance[at] < 0.0 else "above"
+    share, apart = float(makes[at]) ** 2, f"{abs(distance[at]):.1f} % {side} {speed:,.4g} rpm"
+    power = f"{percent(share)} of the power" if share < 1.0 else "as loud as all lines"
+    lines = f"all lines of that harmonic by that mode are {power}"
+    card = f"mode {mode} meets mesh harmonic {harmonic}, {apart}: {lines}"
+    if not at_loudest.any():
+        return card, ""
+    kind = f" ({results.modes['kind'].values[mode - 1]})" if "modes" in results.stages else ""
+    return card, f"mode {mode}{kind} meets mesh harmonic {harmonic}, {lines}"

@@ -19,7 +19,7 @@ from femgear.case.gear_set import planetary_set, set_deviations
 from femgear.case.quantities import RPM
 from femgear.exchange.formats import Shapes, Signal, Spectrum, line_extent
 from femgear.exchange.sampling import Sampling
-from femgear.findings import Finding
+from femgear.findings import Finding, percent
 from femgear.gears.modifications import FlankForm
 from femgear.gears.planetary import mesh_names
 from femgear.housing.orders import OrderSpectrum, analyse_band, order_level
@@ -1109,7 +1109,7 @@ def mesh_bands(results: Results) -> Block:
         "published",
     )
     notes = [
-        f"lobes of the envelope a carrier revolution that stand out by {threshold:.0%} of its largest value; "
+        f"lobes of the envelope a carrier revolution that stand out by {percent(threshold)} of its largest value; "
         "third: level of the third line below the strongest; Hanning lobes: of the classical model, in which "
         "each planet is heard through a Hanning window while it passes the sensor",
         *dict.fromkeys(f"published: {entry.source}" for entry in case.housing.published),

@@ -20,7 +20,7 @@ import numpy as np
 
 from femgear.case.dependencies import Steps
 from femgear.errors import CaseError, several
-from femgear.findings import Finding
+from femgear.findings import Finding, percent
 from femgear.report.tables import Block, merged_names, tabulate
 from femgear.solvers.periodic.harmonic_balance import displacements, solve_harmonic_balance
 from femgear.solvers.periodic.solution import PeriodicSolution
@@ -529,7 +529,7 @@ def balance_warnings(data: xr.Dataset) -> Iterator[Finding]:
         if share.max(initial=0.0) > 0.0:
             mesh = data["mesh"].values[int(share.argmax())]
             count = f"{int((share > 0.0).sum())} of {len(share)} meshes"
-            text = f"{count} {words} a part of the time, {mesh} for {share.max():.1%}"
+            text = f"{count} {words} a part of the time, {mesh} for {percent(share.max(), 1)}"
             yield Finding(code, "operation.load_case", text)
 
 
@@ -542,8 +542,8 @@ def describe_balance(data: xr.Dataset) -> Block:
         "largest [N]": lambda i: f"{float(data['largest_force'].values[i]):.5g}",
         "smallest [N]": lambda i: f"{float(data['lowest_force'].values[i]):.5g}",
         "back flank [N]": lambda i: f"{float(data['largest_back_force'].values[i]):.5g}",
-        "apart": lambda i: f"{float(data['parted_share'].values[i]):.1%}",
-        "on the back": lambda i: f"{float(data['back_share'].values[i]):.1%}",
+        "apart": lambda i: percent(float(data["parted_share"].values[i]), 1),
+        "on the back": lambda i: percent(float(data["back_share"].values[i]), 1),
     }
     others = "all carriers turning" if data.attrs["together"] else "the meshes of the others as springs"
     note = f"each stage with {others}; uneven: largest over mean of the mean mesh force"

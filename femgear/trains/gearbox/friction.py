@@ -15,7 +15,7 @@ from femgear.case.gear_set import planetary_set
 from femgear.case.quantities import RPM
 from femgear.case.tooth_friction import NOTICEABLE_CHANGE, friction_acts, rubbing_coefficients
 from femgear.errors import CaseError
-from femgear.findings import Finding
+from femgear.findings import Finding, percent
 from femgear.gears.pair import GearSet
 from femgear.trains.gearbox.case_file import CASING, BoxPlanetarySection, GearboxCase, PairSection, teeth_of
 from femgear.trains.gearbox.model import GearboxModel, StageModel, gearbox_model, reference_shaft
@@ -127,7 +127,7 @@ def _at_other_speeds(model: GearboxModel, shares: dict[float, float]) -> Iterato
     change, name, speed, here, there = largest
     text = (
         f"friction acts at all speeds with the coefficient of the load case, {here:.3g} at {name}; "
-        f"at {speed / RPM:.5g} rpm of {reference_shaft(model)} it would be {there:.3g}, {change:+.0%}"
+        f"at {speed / RPM:.5g} rpm of {reference_shaft(model)} it would be {there:.3g}, {percent(change, signed=True)}"
     )
     remedy = "compute other speeds as load cases of their own"
-    yield Finding("W-FRICTION", "losses.friction", text, remedy=remedy, limit=f"within {NOTICEABLE_CHANGE:.0%}")
+    yield Finding("W-FRICTION", "losses.friction", text, remedy=remedy, limit=f"within {percent(NOTICEABLE_CHANGE)}")

@@ -10,6 +10,7 @@ from typing import Any
 
 from femgear.case.gear_set import planetary_set
 from femgear.errors import CaseError
+from femgear.findings import percent
 from femgear.gears.planetary import equal_planet_angles
 from femgear.gears.profile import base_helix_angle
 from femgear.system.rolling_bearings import BallBearing, Bearing, RollerBearing
@@ -229,7 +230,7 @@ def _check_ratio(radii: float, teeth: float) -> None:
             f"the teeth have the ratio {teeth:.6g}, the radii {radii:.6g}",
             code="E-TEETH",
             key="teeth",
-            limit=f"ratios within {_RATIO_TOLERANCE:.1%} of one another",
+            limit=f"ratios within {percent(_RATIO_TOLERANCE, 1)} of one another",
             remedy="correct the teeth or the radii, or give module in place of the radii",
         )
 

@@ -9,6 +9,7 @@ import numpy as np
 
 from femgear.case.level_limits import limit_at
 from femgear.case.load_spectrum import required_life
+from femgear.findings import percent
 from femgear.report.tables import Marks, merged_names
 from femgear.stages.judgements import (
     Judgement,
@@ -37,7 +38,7 @@ from femgear.stages.tooth_faults import fault_words
 from femgear.trains.gearbox.case_file import teeth_of
 from femgear.trains.gearbox.mode_words import near_mode
 from femgear.trains.gearbox.response_results import OF_BOX_RESPONSE, line_origin, main_way
-from femgear.trains.gearbox.silence import why_silent
+from femgear.trains.gearbox.silence import silence_words
 from femgear.trains.gearbox.strength import least_safety
 
 _CALM = 1.01
@@ -46,6 +47,8 @@ _IDLE = 1e-3
 """Mean force of a mesh over the largest force of all up to which it carries nothing that a ratio would tell about."""
 _RESPONSES = "dynamics", "runup", "balance", "transient"
 """Stages with motion."""
+_BY_ALL_STAGES = "a run of all stages computes it"
+"""What gives an answer that the case has and this run has not."""
 
 
 def gearbox_judgements(results: Any) -> Iterator[Judgement]:
@@ -59,7 +62,9 @@ def gearbox_judgements(results: Any) -> Iterator[Judgement]:
         parts = (*lives_of_teeth(data), *lives_of_bearings(data))
         yield from judge_lives(parts, required_life(case.operation), findings, unknown)
     yield from judge_heat(results)
-    yield judge_smoothness(_motion(results), results, _RESPONSES)
+    moves = any(stage in stages for stage in _RESPONSES)
+    remedy = "" if moves else silence_words(case) or _BY_ALL_STAGES
+    yield judge_smoothness(_motion(results), results, _RESPONSES, remedy)
     if "dynamics" in stages and results.dynamics.sizes.get("sensor", 0):
         yield _noise(results)
     else:
@@ -173,7 +178,7 @@ def _largest_force(results: Any) -> str:
     where = f"{results[stage]['stage'].values[number]} at {results[stage]['speed'].values[speed]:,.4g} rpm"
     largest = float(np.nanmax(factors))
     if largest < _CALM:
-        return f"Its mesh forces stay within {_CALM - 1.0:.0%} of their mean"
+        return f"Its mesh forces stay within {percent(_CALM - 1.0)} of their mean"
     return f"Its mesh forces reach {largest:.2f} times their mean ({where})"
 
 
@@ -184,9 +189,9 @@ def _unheard(results: Any) -> Judgement:
         open_words = "femgear casing CASE gives it a casing with sensors"
         if case.motions == "rotation":
             open_words = f'shafts that rotate alone shake nothing: with bearings and motions = "plane" {open_words}'
-        return judge_noise("no sensor in this run", forces, open_words=open_words)
-    why = why_silent(case) or "its response was not computed"
-    return judge_noise("no level at its sensors", forces, open_words=why)
+        return judge_noise("no sensor in this run", forces, open_words=open_words, computed=False)
+    why = silence_words(case) or _BY_ALL_STAGES
+    return judge_noise("no level at its sensors", forces, open_words=why, computed=False)
 
 
 def _noise(results: Any) -> Judgement:
@@ -206,7 +211,9 @@ def _noise(results: Any) -> Judgement:
     mode = "" if modes is None else near_mode(modes, hertz)
     near = f", near {mode}," if mode else ""
     share, line_words = 0.5 * (size[line] / whole) ** 2, f"{line_origin(data, line)} at {hertz:,.0f} Hz"
-    sentence = f"At {speed:,.4g} rpm sensor {name} has {size_words}: {line_words}{near} makes {share:.0%} of the power"
+    sentence = (
+        f"At {speed:,.4g} rpm sensor {name} has {size_words}: {line_words}{near} makes {percent(share)} of the power"
+    )
     resonance = "" if modes is None else resonance_of_line(line_words, hertz, modes["frequency"].values, share)
     if "path_share" in data:
         sentence += f"; the largest part comes by {main_way(data, sensor)}"

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from femgear.findings import Finding
+from femgear.findings import Finding, percent
 from femgear.report.tables import Block, Marks, tabulate
 from femgear.system.bearing_life import (
     basic_rating_life,
@@ -147,7 +147,7 @@ def shortest_life(data: xr.Dataset, marks: Marks | None = None) -> Iterator[tupl
         text = f"{hours}, {data['bearing'].values[at]}"
         if len(cases) > 1:
             damage = np.nan_to_num(data["damage_share"].values[:, at])
-            text += f", over all load cases; {damage.max():.0%} of the damage in {cases[int(damage.argmax())]}"
+            text += f", over all load cases; {percent(damage.max())} of the damage in {cases[int(damage.argmax())]}"
         yield f"shortest bearing life {words}", text
 
 
@@ -198,7 +198,7 @@ def describe_load_cases(data: xr.Dataset) -> Iterator[Block]:
 
     def most(i: int) -> str:
         damage = data["damage_share"].values[:, i]
-        return f"{names[int(damage.argmax())]} ({damage.max():.0%})" if np.isfinite(damage).all() else "-"
+        return f"{names[int(damage.argmax())]} ({percent(damage.max())})" if np.isfinite(damage).all() else "-"
 
     columns = {
         "bearing": lambda i: bearings[i],

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from femgear.findings import Finding
+from femgear.findings import Finding, percent
 from femgear.trains.gearbox.case_file import PairSection, named_load_case
 from femgear.trains.gearbox.casing import called
 from femgear.trains.gearbox.deflection import LEVERS, Deflection, laws_of, spread_rows
@@ -117,7 +117,7 @@ def loose_notes(data: xr.Dataset) -> Iterator[str]:
     ):
         force = f"{low:.5g} N to {high:.5g} N" if high else "nothing"
         yield f"{called('bearing', name)} carries {force}" + (
-            f", {loose:.1%} of the time nothing" if 0.0 < loose < 1.0 else ""
+            f", {percent(loose, 1)} of the time nothing" if 0.0 < loose < 1.0 else ""
         )
 
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from femgear.case.quantities import RPM
-from femgear.findings import Finding
+from femgear.findings import Finding, percent
 from femgear.housing.sound import REFERENCE_ACCELERATION, a_weighting
 from femgear.report.tables import Block, in_decibels, tabulate
 from femgear.stages.protocol import StageResult
@@ -475,13 +475,13 @@ def _cross_finding(data: xr.Dataset) -> Finding:
     largest, stage = cross.max(), int(first)
     of_mean = largest * np.nanmax((data["mesh_force_rms"] / data["mean_force"]).values[speed, stage])
     text = (
-        f"the stiffness of {names[first]} on the motion by {names[second]} makes {largest:.0%} of its dynamic force at "
-        f"{data['speed'].values[speed]:.5g} rpm, and is left out: {of_mean:.2g} of its mean force"
+        f"the stiffness of {names[first]} on the motion by {names[second]} makes {percent(largest)} of its dynamic "
+        f"force at {data['speed'].values[speed]:.5g} rpm, and is left out: {of_mean:.2g} of its mean force"
     )
     if "level_of_stage" in data:
         share = data["level_of_stage"].values[speed, :, stage] / data["level"].values[speed]
         text += f", {largest * np.nanmax(share):.2g} of the level at {data['sensor'].values[int(np.nanargmax(share))]}"
-    return Finding("W-CROSS", "", text, limit=f"{_CROSS:.0%}")
+    return Finding("W-CROSS", "", text, limit=percent(_CROSS))
 
 
 def _of_speeds(speeds: np.ndarray, chosen: np.ndarray) -> str:
@@ -546,7 +546,7 @@ def _levels(data: xr.Dataset, at: int) -> Block:
         "sensor": lambda i: str(data["sensor"].values[i]),
         "level [m/s^2]": lambda i: f"{whole[i]:.4g}",
     } | {
-        f"{name}": lambda i, stage=stage: f"{(parts[i, stage] / max(whole[i], 1e-300)) ** 2:.1%}"
+        f"{name}": lambda i, stage=stage: percent((parts[i, stage] / max(whole[i], 1e-300)) ** 2, 1)
         for stage, name in enumerate(data["stage"].values.tolist())
     }
     speed = float(data["speed"].values[at])
@@ -557,7 +557,9 @@ def _paths(data: xr.Dataset, at: int) -> Block:
     """Shares of the ways into the casing in the power at all sensors."""
     share = data["path_share"].values[at]
     columns = {"path": lambda i: str(data["path"].values[i])} | {
-        str(name): lambda i, sensor=sensor: "-" if np.isnan(share[i, sensor]) else f"{share[i, sensor]:+.1%}"
+        str(name): lambda i, sensor=sensor: (
+            "-" if np.isnan(share[i, sensor]) else percent(share[i, sensor], 1, signed=True)
+        )
         for sensor, name in enumerate(data["sensor"].values.tolist())
     }
     order = np.argsort(-np.nan_to_num(np.abs(share)).max(axis=1), kind="stable").tolist()
@@ -591,7 +593,7 @@ def main_way(data: xr.Dataset, sensor: int) -> str:
     way, name = int(share.argmax()), str(data["path"].values[int(share.argmax())])
     if share[way] > _CANCELS:
         return f"{name}, but {data['path'].values[int(share.argmin())]} takes most of that away"
-    return f"{name} ({share[way]:.0%} of the power)"
+    return f"{name} ({percent(share[way])} of the power)"
 
 
 def line_origin(data: xr.Dataset, line: int) -> str:

@@ -16,7 +16,7 @@ from femgear.case.load_spectrum import running_shares
 from femgear.case.messages import estimated_materials
 from femgear.case.quantities import LENGTH, RPM
 from femgear.errors import GeometryError
-from femgear.findings import DOUBT, FAULT, Finding
+from femgear.findings import DOUBT, FAULT, Finding, percent
 from femgear.gears.checks import check_meshes
 from femgear.gears.planetary import assembly_positions, feasible_angles
 from femgear.report.tables import Block, describe_modes, tabulate
@@ -537,7 +537,7 @@ def deflection_warnings(data: xr.Dataset) -> Iterator[Finding]:
         idle = np.where(np.nansum(np.abs(load), axis=1) > _LEAST_LOAD, idle, 0.0)
         if idle.max(initial=0.0) > 0.0:
             worst = int(idle.argmax())
-            text = f"{data['mesh'].values[worst]} carries on {1.0 - idle[worst]:.0%} of its width alone"
+            text = f"{data['mesh'].values[worst]} carries on {percent(1.0 - idle[worst])} of its width alone"
             yield Finding("W-FACE-LOAD", "", text, remedy="stiffer shafts or bearings, or a lead modification")
 
 

@@ -41,6 +41,11 @@ def _silence(case: GearboxCase) -> tuple[str, str]:
     return "", ""
 
 
+def silence_words(case: GearboxCase) -> str:
+    """Say why a case has no response and what gives one, empty where it has one."""
+    return ": ".join(filter(None, _silence(case)))
+
+
 def why_silent(case: GearboxCase) -> str:
     """Tell why a case has no response, empty where it has one."""
     return _silence(case)[0]

@@ -15,7 +15,7 @@ import numpy as np
 
 from femgear.case.quantities import FREQUENCY, RPM, SPEED, TIME
 from femgear.errors import CaseError
-from femgear.findings import Finding
+from femgear.findings import Finding, percent
 from femgear.solvers.time.free_turn import SpeedRange, reached_speeds
 from femgear.solvers.time.low_pass import PASS_BAND
 from femgear.system.turning_meshes import planet_wave_generator
@@ -292,7 +292,7 @@ def check_turning(shaft: str, late: SpeedRange) -> None:
             f"{abs(late.mean) / RPM:.6g} rpm in the mean; there are no orders",
             code="E-SPECTRUM",
             key="transient.torque",
-            limit=f"never slower than {_SLOWEST:.0%} of its mean speed where spectra are taken",
+            limit=f"never slower than {percent(_SLOWEST)} of its mean speed where spectra are taken",
             remedy="give torques that keep it turning, or write --only transient",
         )
 
@@ -411,9 +411,9 @@ def slow_steps(mode: float, rate: float) -> Iterator[Finding]:
         yield Finding(
             "W-RATE",
             "transient.rate",
-            f"steps of {rate:g} Hz lower the mode of {mode:.4g} Hz, which the meshes drive, by {shift:.2%}",
-            remedy=f"{_up(shift_rate(mode, _SHIFT))} Hz lowers it by {_SHIFT:.0%}, "
-            f"{_up(shift_rate(mode, _SMALL_SHIFT))} Hz by {_SMALL_SHIFT:.1%}",
+            f"steps of {rate:g} Hz lower the mode of {mode:.4g} Hz, which the meshes drive, by {percent(shift, 2)}",
+            remedy=f"{_up(shift_rate(mode, _SHIFT))} Hz lowers it by {percent(_SHIFT)}, "
+            f"{_up(shift_rate(mode, _SMALL_SHIFT))} Hz by {percent(_SMALL_SHIFT, 1)}",
         )
 
 

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from femgear.case.quantities import RPM
+from femgear.findings import percent
 from femgear.report.style import COLOURS, GREY, SIZE, label, legend_below, new_figure, show_changes
 from femgear.solvers.time.low_pass import PASS_BAND
 from femgear.stages.protocol import Figures
@@ -224,7 +225,7 @@ def transient_figures(data: xr.Dataset) -> dict[str, Figure]:
     if meshes:
         contact = "linear meshes keep contact"
         if separating(data):
-            contact = f"meshes part, for up to {float(data['lost'].max()):.2%} of the time"
+            contact = f"meshes part, for up to {percent(float(data['lost'].max()), 2)} of the time"
         notes = (contact, passed, passed and "least and largest force of all steps in the table")
         title = "; ".join(filter(None, notes))
         forces = _curves(data, "mesh_force", meshes)

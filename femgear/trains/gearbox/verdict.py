@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from femgear.findings import percent
 from femgear.report.tables import Block, Marks, doubtful_excitation, merged_names
 from femgear.stages.friction_source import friction_rows
 from femgear.stages.heat_results import heat_rows
@@ -86,7 +87,7 @@ def _worst_of_deflection(data: Any, marks: Marks) -> Iterator[tuple[str, str]]:
         stages = dict[str, list[str]]()
         for name, value in zip(data["stage"].values, share[at], strict=True):
             if np.isfinite(value):
-                stages.setdefault(f"{value:.1%}", []).append(str(name))
+                stages.setdefault(percent(value, 1), []).append(str(name))
         parts = [f"{merged_names(names)} {value}" for value, names in stages.items()]
         case = f", {cases[at]}" if len(cases) > 1 else ""
         yield "torque of stages side by side", f"{of_teeth(', '.join(parts))}{case}"
@@ -147,7 +148,7 @@ def _main_line(data: Any, sensor: int, whole: float, modes: Any) -> str:
     size = np.hypot(data["lines_real"].values[0, sensor], data["lines_imag"].values[0, sensor])
     line = int(size.argmax())
     hertz = float(data["order"].values[line]) * float(data["speed"].values[0]) / 60.0
-    text = f"{hertz:.1f} Hz, {line_origin(data, line)}: {0.5 * (size[line] / whole) ** 2:.0%} of the power"
+    text = f"{hertz:.1f} Hz, {line_origin(data, line)}: {percent(0.5 * (size[line] / whole) ** 2)} of the power"
     mode = "" if modes is None else near_mode(modes, hertz)
     return f"{text}; {mode}" if mode else text
 

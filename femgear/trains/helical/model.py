@@ -33,6 +33,7 @@ from femgear.case.tooth_friction import no_acting_friction
 from femgear.contact.bodies import make_bodies, make_sectors
 from femgear.contact.cycle import walk_mesh_cycle
 from femgear.errors import CaseError, ConvergenceError, GeometryError
+from femgear.findings import percent
 from femgear.gears import profile
 from femgear.gears.iso6336_stiffness import material_factor
 from femgear.gears.kinematics import torques
@@ -118,7 +119,7 @@ class HelicalSet(RigidSet):
                 code="E-RANGE",
                 key="centre_distance",
                 value=self.centre_distance,
-                limit=f"(r_s + r_p) / cos alpha_sp and (r_r - r_p) / cos alpha_pr, within {_CLOSURE:.0%}",
+                limit=f"(r_s + r_p) / cos alpha_sp and (r_r - r_p) / cos alpha_pr, within {percent(_CLOSURE)}",
                 remedy=f"radii, centre distance and pressure angles miss each other by {abs(worst):.3g}",
             )
 

@@ -17,7 +17,7 @@ import numpy as np
 from femgear.case.gear_set import planetary_set, support_text
 from femgear.case.planetary import output_member
 from femgear.case.quantities import RPM
-from femgear.findings import NOTE, Finding, findings_in
+from femgear.findings import NOTE, Finding, findings_in, percent
 from femgear.gears.kinematics import torques
 from femgear.report.response import stored_harmonics
 from femgear.report.tables import Block, Marks, chosen, first_speeds, significant, tabulate
@@ -581,6 +581,6 @@ def doubts(results: Results, stem: str) -> Iterator[str]:
     tail = motion if stem.startswith(_OF_MOTION) else max(motion, force)
     if tail > TAIL_LIMIT:
         yield (
-            f"Marked where more than {TAIL_LIMIT:.0%} of the amplitude lies in the upper half of the "
+            f"Marked where more than {percent(TAIL_LIMIT)} of the amplitude lies in the upper half of the "
             f"harmonics (up to {tail:.2g}): shapes and peaks there are not to be trusted (W-TAIL)."
         )

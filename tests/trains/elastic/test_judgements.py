@@ -43,7 +43,9 @@ def results():
         },
         {"speed": [1000.0, 3000.0, 4000.0]},
     )
-    modes = xr.Dataset({"frequency": ("mode", [500.0, 2200.0]), "kind": ("mode", ["rotational", "ring"])})
+    frequency = [500.0, 2200.0, 6e3, 7e3, 8e3, 9e3, 9.5e3]
+    kinds = ["rotational", "ring", *["translational"] * 4, "ring, rotational"]
+    modes = xr.Dataset({"frequency": ("mode", frequency), "kind": ("mode", kinds)})
     return SimpleNamespace(
         case=read_case(CASE),
         findings=(),
@@ -65,8 +67,9 @@ def judged(results):
 
 
 def test_the_main_line_is_that_of_the_acceleration_with_its_mode(results):
+    results.runup["distance"].values[1] = 12.0  # no resonance makes the level
     noise = judged(results)
-    assert "its largest line, 2,160 Hz (mesh harmonic 2, near mode 2: ring), makes 80% of" in noise.sentence
+    assert "its largest line, 2,160 Hz (mesh harmonic 2, near mode 2: ring), makes 80 % of" in noise.sentence
     assert noise.sentence.endswith("Loudest of the run-up: 9 m/s² at 4,000 rpm, the end of its range")
     assert noise.answer == "3.162 m/s² at 3,000 rpm"
 
@@ -98,9 +101,28 @@ def test_levels_that_a_longer_excitation_raises_are_bounds_and_do_not_hold_their
 def test_a_resonance_that_makes_the_level_deserves_a_look(results):
     assert judged(results).state == "look"
     meeting = "mode 7 meets mesh harmonic 2, 1.6 % below 3,000 rpm"
-    assert judged(results).limit == f"{meeting}: all lines of that harmonic by that mode are 64% of the power"
+    assert judged(results).limit == f"{meeting}: all lines of that harmonic by that mode are 64 % of the power"
     results.runup["distance"].values[1] = 12.0
     assert judged(results).state == "open"
+
+
+def test_sentence_and_card_name_one_cause_of_the_level(results):
+    """The resonance of the loudest speed; one of another speed is named by the card, with that speed."""
+    noise = judged(results)
+    lines = "all lines of that harmonic by that mode are 64 % of the power"
+    assert f"at 3,000 rpm the housing has 3.162 m/s²: mode 7 (ring, rotational) meets mesh harmonic 2, {lines}." in (
+        noise.sentence.replace("At", "at")
+    )
+    assert "largest line" not in noise.sentence and noise.limit.startswith("mode 7 meets mesh harmonic 2, ")
+    # a resonance of a speed that is less loud does not make the level of the sentence
+    results.runup["operating_speed"].values[:] = [3000.0, 1000.0]
+    results.runup["operating_alone"].values[:] = [0.8 * 3.162, 0.9]
+    both = judged(results)
+    assert both.limit.startswith("mode 2 meets mesh harmonic 1, 0.1 % above 3,000 rpm")
+    results.runup["operating_alone"].values[0] = 0.1
+    quieter = judged(results)
+    assert quieter.limit.startswith("mode 7 meets mesh harmonic 2, 1.6 % below 1,000 rpm")
+    assert "its largest line, 2,160 Hz (mesh harmonic 2, near mode 2: ring)" in quieter.sentence
 
 
 def test_a_set_without_a_run_up_is_judged_by_its_largest_line(results):
@@ -109,7 +131,7 @@ def test_a_set_without_a_run_up_is_judged_by_its_largest_line(results):
     mode = int(np.abs(results.modes["frequency"].values - hertz).argmin())
     results.modes["frequency"].values[mode] = 1.02 * hertz
     apart = f"2.0 % below mode {mode + 1} at 2,203 Hz"
-    words = f"mesh harmonic 2 at 2,160 Hz, {apart}, makes 80% of the power"
+    words = f"mesh harmonic 2 at 2,160 Hz, {apart}, makes 80 % of the power"
     assert (judged(results).state, judged(results).limit) == ("look", words)
 
 
@@ -141,5 +163,6 @@ def test_a_limit_of_the_microphone_holds_in_operation(results):
 def test_no_line_stands_out_of_many_and_a_far_mode_is_not_named(results):
     results.housing["level"][:] = 12.0
     results.modes["frequency"].values[1] = 2500.0
+    results.runup["distance"].values[1] = 12.0
     sentence = judged(results).sentence
-    assert "no line stands out, the largest line, 2,160 Hz (mesh harmonic 2), makes 6% of" in sentence
+    assert "no line stands out, the largest line, 2,160 Hz (mesh harmonic 2), makes 6 % of" in sentence

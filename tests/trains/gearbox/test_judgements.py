@@ -9,7 +9,7 @@ import xarray as xr
 from casings import answer_in_a_casing
 
 from femgear.case.level_limits import LevelPoint
-from femgear.findings import DOUBT, Finding
+from femgear.findings import DOUBT, Finding, percent
 from femgear.stages.judgements import QUIET, SMOOTH, STRONG, SURE
 from femgear.trains.gearbox.judgements import gearbox_judgements
 from femgear.trains.gearbox.mode_words import near_mode
@@ -50,7 +50,7 @@ def test_the_questions_of_a_gearbox_in_a_casing(results):
     assert f"mesh harmonic {data['harmonic'].values[line]:g} at {hertz:,.0f} Hz" in sentence
     mode = near_mode(results.modes, hertz)
     near = f" near {mode}," if mode else ""
-    assert f"{near} makes {power:.0%} of the power" in sentence
+    assert f"{near} makes {percent(power)} of the power" in sentence
     way = data["path"].values[int(data["path_share"].values[0, :, sensor].argmax())]
     assert f"the largest part comes by {way} (" in sentence and "Loudest of the run-up: " in sentence
 
@@ -140,10 +140,12 @@ def test_sensors_of_a_gearbox_without_torque_are_told_why_they_hear_nothing(resu
     operation = results.case.operation.model_copy(update={"load_case": (still,)})
     idle.case = results.case.model_copy(update={"operation": operation})
     noise = {judgement.question: judgement for judgement in gearbox_judgements(idle)}[QUIET]
-    assert noise.answer == "no level at its sensors" and noise.limit == "no stage that excites it carries a torque"
+    assert noise.answer == "no level at its sensors" and noise.words == "○ not computed"
+    remedy = "give a torque that is not zero in the load case of operation.first"
+    assert noise.limit == f"no stage that excites it carries a torque: {remedy}"
     idle.case = results.case
     noise = {judgement.question: judgement for judgement in gearbox_judgements(idle)}[QUIET]
-    assert noise.limit == "its response was not computed"
+    assert noise.limit == "a run of all stages computes it"
     idle.case = results.case.model_copy(update={"sensor": ()})
     noise = {judgement.question: judgement for judgement in gearbox_judgements(idle)}[QUIET]
     assert noise.answer == "no sensor in this run"

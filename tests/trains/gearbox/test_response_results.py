@@ -125,7 +125,7 @@ def test_stages_that_change_one_another_are_told(data):
     (finding,) = gearbox_response_warnings(data.assign(cross_excitation=cross))
     assert finding.code == "W-CROSS"
     part = 0.2 * float((data["mesh_force_rms"] / data["mean_force"]).values[1, 0, 0])
-    assert "20%" in finding.text and f"{part:.2g} of its mean force, 0.2 of the level at" in finding.text
+    assert "20 %" in finding.text and f"{part:.2g} of its mean force, 0.2 of the level at" in finding.text
 
 
 def test_peaks_between_the_speeds_of_a_run_up_are_told(data):
@@ -193,7 +193,7 @@ def test_forces_that_a_longer_excitation_changes_are_told():
 
 
 def test_ways_that_cancel_have_no_share():
-    assert main_way(small_response(), 0) == "bearing A (70% of the power)"
+    assert main_way(small_response(), 0) == "bearing A (70 % of the power)"
     cancelling = (("speed", "path", "sensor"), [[[-11.0], [12.0]]] * 2)
     assert main_way(small_response(path_share=cancelling), 0) == "bearing B, but bearing A takes most of that away"
 

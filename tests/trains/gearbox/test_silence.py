@@ -4,7 +4,7 @@ import pytest
 from small_gearbox import pair_tables, planetary_tables
 
 from femgear.trains.gearbox.power import gearbox_flow
-from femgear.trains.gearbox.silence import idle_entries, why_silent
+from femgear.trains.gearbox.silence import idle_entries, silence_words, why_silent
 from femgear.trains.reading import read_case
 from femgear.trains.registry import train_of
 
@@ -40,6 +40,7 @@ def test_entries_of_a_response_that_there_is_not_are_told(teeth, change, words):
     change(tables)
     case = read_case(tables)
     assert words in why_silent(case)
+    assert silence_words(case).startswith(f"{why_silent(case)}: ")
     findings = [*idle_entries(case)]
     assert [(one.code, one.key) for one in findings] == [("W-UNUSED", "sensor"), ("W-UNUSED", "runup")]
     assert all(words in one.text and one.remedy for one in findings)

@@ -144,7 +144,7 @@ def test_steps_that_lower_a_mode_are_said_with_the_rates_that_do_not():
     assert 0.98 * 1e-2 < frequency_shift(1500.0, shift_rate(1500.0, 1e-2)) <= 1e-2
     (finding,) = slow_steps(1425.0, 20e3)
     assert finding.code == "W-RATE" and "1.6" in finding.text
-    fast = float(re.search(r"(\S+) Hz lowers it by 1%", finding.remedy)[1])
+    fast = float(re.search(r"(\S+) Hz lowers it by 1 %", finding.remedy)[1])
     assert [*slow_steps(1425.0, 0.98 * fast)] and not [*slow_steps(1425.0, 1.01 * fast)]
 
 

@@ -154,7 +154,7 @@ def test_spectra_tell_that_the_speed_changes():
 
 
 @pytest.mark.parametrize(
-    ("contact", "words"), [("linear", "linear meshes keep"), ("separating", "part, for up to 1.23%")]
+    ("contact", "words"), [("linear", "linear meshes keep"), ("separating", "part, for up to 1.23 %")]
 )
 def test_titles_follow_the_contact_and_the_low_pass(contact, words):
     figures = transient_figures(results(contact)[0])
