@@ -94,7 +94,7 @@ REFUSED = {
     ),
     "meshes that ask for different centre distances": (
         [(DISTANCE, ""), ("profile_shift = 0.52681", "profile_shift = 0.0")],
-        ("E-COAXIAL", "set.centre_distance", "27 + 2 x 40 = 107, ring 108", "one centre distance", "shifts"),
+        ("E-COAXIAL", "set.centre_distance", "27 + 2 x 40 = 107, ring 108", "one centre distance", "26/40/106"),
     ),
     "no planet": ([("planets = 3", "planets = 0")], ("E-RANGE", "set.planets", "0", "1 to 1000")),
     "a thousand planets": (

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from typing import Any
 
-from femgear.app.document import tables_of_text, with_entry
 from femgear.app.form import sentence_of
 from femgear.errors import CaseError, FemgearError
-from femgear.trains.drafts import KINDS, ToothForm, new_case
+from femgear.trains.drafts import KINDS, NamedSteel, ToothForm, new_case
 from femgear.trains.planets_draft import PLANET_KINDS
 from femgear.trains.reading import parse_case
 from femgear.trains.registry import check_case
@@ -118,26 +117,9 @@ def _read(kind: str, field: str, written: str) -> Any:
 def _draft(kind: str, given: Mapping[str, Any]) -> str:
     """Draft a case of numbers by the names of their fields."""
     options = {name: value for name, value in given.items() if name not in ("helix", "treatment", "hardness")}
-    text = new_case(kind, **options, form=ToothForm(helix=given.get("helix")))
-    if "treatment" in given and "hardness" in given:
-        for material in list(_materials(tables_of_text(text))):
-            for name in ("treatment", "hardness"):
-                text = with_entry(text, f"{material}.{name}", given[name])
-            text = with_entry(text, f"{material}.estimated", None)
-    return text
-
-
-def _materials(tables: Any, key: str = "") -> Iterator[str]:
-    """Keys of the materials of a case, and of the teeth within a gearbox."""
-    for name, value in tables.items():
-        inner = f"{key}.{name}".lstrip(".")
-        if name == "material":
-            yield inner
-        elif isinstance(value, dict):
-            yield from _materials(value, inner)
-        elif isinstance(value, list):
-            for number, row in enumerate(value):
-                yield from _materials(row, f"{inner}[{number}]") if isinstance(row, dict) else ()
+    rated = {"treatment", "hardness"} <= {*given}
+    steel = NamedSteel(given["treatment"], given["hardness"]) if rated else None
+    return new_case(kind, **options, form=ToothForm(helix=given.get("helix")), steel=steel)
 
 
 def _check_hardness(text: str) -> None:

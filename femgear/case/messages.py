@@ -25,6 +25,7 @@ from femgear.case.sections import RackSection, gear_material
 from femgear.case.tooth_measures import MEASURES
 from femgear.errors import CaseError, GeometryError, several
 from femgear.findings import Finding, remark
+from femgear.gears.phasing import coaxial_teeth
 
 _DIMENSIONS = {
     "centre_distance": LENGTH,
@@ -209,6 +210,8 @@ def in_terms_of_the_case(error: GeometryError, case: Case) -> None:
         )
     if error.code == "E-ASSEMBLY":
         _assembly(error, case)
+    if error.code == "E-COAXIAL":
+        error.remedies = (*error.remedies, *_coaxial_teeth_of(case))
     if error.key == "rack.root_radius":
         if getattr(getattr(case, error.gear or "", None), "rack", None) is not None:
             error.key = f"{error.gear}.rack.root_radius"
@@ -235,6 +238,16 @@ def _assembly(error: GeometryError, case: Case) -> None:
         error.key, error.value = "set.planets", case.set.planets
         return
     error.value = ", ".join(f"{math.degrees(angle):.6g}" for angle in angles[:24]) + " deg"
+
+
+def _coaxial_teeth_of(case: Case) -> Iterator[str]:
+    """Offer the teeth next to those of a case that close without profile shifts."""
+    teeth = case.sun.teeth, case.planet.teeth, case.ring.teeth
+    near = coaxial_teeth(*teeth, case.set.planets)
+    if near:
+        shifted = any(getattr(case, gear).profile_shift for gear in case.gear_names)
+        offered = " or ".join("/".join(map(str, close)) for close in near[:3])
+        yield f"{'without profile shifts ' if shifted else ''}take {offered} teeth of sun, planet and ring"
 
 
 _OF_MEASURES = {

@@ -352,9 +352,12 @@ def Number(low: float, high: float, *, open_low: bool = False, open_high: bool =
 
     def convert(value: object) -> float:
         if isinstance(value, bool) or not isinstance(value, int | float):
-            match = _NUMBER.fullmatch(str(value))
-            plain = "write it without quotes" if match and not match[2].strip() else None
-            remedy = f"write {float(match[1]) / 100:g}" if match and match[2].strip() == "%" else plain
+            match = _NUMBER.fullmatch(value) if isinstance(value, str) else None
+            remedy = None
+            if match and match[2].strip() == "%":
+                remedy = f"write {float(match[1]) / 100:g}"
+            elif match:
+                remedy = "write the number alone, without unit" if match[2].strip() else "write it without quotes"
             message = f"a number is needed, not {described(value)}"
             raise CaseError(message, code="E-TYPE", value=value, limit=limit, remedy=remedy)
         above = low < value if open_low else low <= value
@@ -469,11 +472,11 @@ def Count(low: int, high: int, *, note: str = "", signed: bool = False, remedy: 
         What to do about a number outside.
     """
 
+    limit = f"{low} to {high}" if low < high else f"{low}"
+
     def convert(value: object) -> int:
         if isinstance(value, bool) or not isinstance(value, int):
-            plain = "write it without quotes" if isinstance(value, str) else None
-            message = f"a whole number is needed, not {described(value)}"
-            raise CaseError(message, code="E-TYPE", value=value, limit=f"{low} to {high}", remedy=plain)
+            raise _no_whole_number(value, limit)
         number = abs(value) if signed else value
         if not low <= number <= high:
             why, sign = (
@@ -484,13 +487,27 @@ def Count(low: int, high: int, *, note: str = "", signed: bool = False, remedy: 
                 f"{shown(value)} is out of range{': ' + why if why else ''}",
                 code="E-RANGE",
                 value=found(value),
-                limit=f"{low} to {high}",
+                limit=limit,
                 remedy=sign or remedy,
             )
         return number
 
     schema = {"type": "integer", "minimum": -high if signed else low, "maximum": high}
     return _Reader(convert, schema)
+
+
+def _no_whole_number(value: object, limit: str) -> CaseError:
+    """Make the refusal of what is no whole number, with the number that it holds, in quotes or not."""
+    match = _NUMBER.fullmatch(value) if isinstance(value, str) else None
+    written = match[1] if match and not match[2].strip() else ""
+    number = float(written) if written else value if isinstance(value, float) else None
+    what, remedy = described(value), None
+    if number is not None and math.isfinite(number):
+        what, remedy = (written or str(number)), f"write {int(number)}" if number.is_integer() else None
+        if remedy and written.lstrip("+-").isdigit():
+            what, remedy = described(value), "write it without quotes"
+    message = f"a whole number is needed, not {what}"
+    return CaseError(message, code="E-TYPE", value=value, limit=limit, remedy=remedy)
 
 
 def printable_line(value: object, *, name: str = "title", least: int = 0, most: int = 200) -> str:

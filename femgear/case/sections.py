@@ -305,7 +305,8 @@ def speed_range(value: object) -> object:
     if not isinstance(value, dict):
         if not isinstance(value, list) or not value:
             message = f"a list of speeds is needed, not {'an empty one' if value == [] else described(value)}"
-            raise CaseError(message, code="E-TYPE", value=value, remedy='write ["250 rpm", "3100 rpm"]')
+            example = f'["{value}"]' if isinstance(value, str) and value[:1].isdigit() else '["250 rpm", "3100 rpm"]'
+            raise CaseError(message, code="E-TYPE", value=value, remedy=f"write {example}")
         return value
     if value.keys() != {"from", "to", "count"}:
         raise CaseError(

@@ -488,6 +488,38 @@ def neighbouring_teeth(
     return phasing.only(phasing.room > 0.0) if fitting else phasing
 
 
+def coaxial_teeth(sun_teeth: int, planet_teeth: int, ring_teeth: int, planets: int) -> list[tuple[int, int, int]]:
+    """Find tooth numbers next to those wanted whose unshifted gears have one centre distance and assemble.
+
+    Unshifted gears of one module close where ``z_r = z_s + 2 z_p``; N equally spaced planets assemble where N divides
+    ``z_s + z_r``, and have room where their tips stay apart (H. W. Mueller, as in `neighbouring_teeth`).
+
+    Parameters
+    ----------
+    sun_teeth, planet_teeth, ring_teeth, planets : int
+        Wanted numbers of teeth, all positive, and number of planets.
+
+    Returns
+    -------
+    list of (int, int, int)
+        Teeth of sun, planet and ring: those that change the fewest gears first, then those with the fewest changes.
+    """
+    wanted = np.array([sun_teeth, planet_teeth, ring_teeth])
+    steps = np.arange(-3, 4)
+    closing_planet = (ring_teeth - sun_teeth) // 2
+    tried_planets = np.unique(np.concatenate([planet_teeth + steps, closing_planet + steps]))
+    sun, planet = (numbers.ravel() for numbers in np.meshgrid(sun_teeth + steps, tried_planets, indexing="ij"))
+    teeth = np.stack([sun, planet, sun + 2 * planet], axis=-1)
+    total = teeth[:, 0] + teeth[:, 2]
+    teeth = teeth[(total % planets == 0) & np.all((teeth >= TEETH_RANGE[0]) & (teeth <= TEETH_RANGE[1]), axis=1)]
+    total = teeth[:, 0] + teeth[:, 2]
+    positions = np.arange(planets) * (total // planets)[:, None]
+    teeth = teeth[_room(teeth, positions, total) > 0.0]
+    changes = np.abs(teeth - wanted)
+    order = np.lexsort((changes.sum(axis=1), np.count_nonzero(changes, axis=1)))
+    return [(int(z_s), int(z_p), int(z_r)) for z_s, z_p, z_r in teeth[order]]
+
+
 def check_teeth(phasing: MeshPhasing, planet_teeth: int) -> tuple[str, ...]:
     """Check the tooth numbers of a set, and remark on those that profile shifts must help to one.
 

@@ -432,7 +432,8 @@ def judge_smoothness(answer: str, results: Any, stages: Sequence[str], remedy: s
     if not present:
         return Judgement(SMOOTH, "absent", answer or "no motion", remedy)
     against = list(dict.fromkeys(_against(results, present)))
-    rests_on = f"; {words}" if (words := estimates_words(results.findings)) else ""
+    of_motion = [finding for finding in results.findings if not finding.key.startswith("housing")]
+    rests_on = f"; {words}" if (words := estimates_words(of_motion)) else ""
     if not against and any(finding.code == "W-TAIL" and finding.severity == DOUBT for finding in results.findings):
         return _smoothness("look", answer, f"{_FEW_HARMONICS}{rests_on}")
     if not against and any(finding.code == "W-OPEN" for finding in results.findings):

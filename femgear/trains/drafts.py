@@ -32,7 +32,7 @@ from femgear.case.quantities import (
 from femgear.case.sections import LARGEST_HELIX, FaceWidth, Module
 from femgear.errors import CaseError, GeometryError
 from femgear.gears.checks import planet_room
-from femgear.gears.phasing import neighbouring_teeth
+from femgear.gears.phasing import coaxial_teeth, neighbouring_teeth
 from femgear.gears.planetary import PlanetarySet, equal_planet_angles, feasible_angles, virtual_set
 from femgear.gears.profile import BasicRack, overlap_ratio, transverse_rack, transverse_tool
 from femgear.gears.shifts import SharedShifts, share_shifts
@@ -145,6 +145,22 @@ class ToothForm:
     addendum: float | None = None
 
 
+@dataclass(frozen=True)
+class NamedSteel:
+    """Steel of all gears of a new case, from whose limits its safeties follow.
+
+    Parameters
+    ----------
+    treatment : str
+        Of `femgear.gears.gear_steels.Treatment`.
+    hardness : float
+        Of its surface, HV or HBW as the treatment has it.
+    """
+
+    treatment: str
+    hardness: float
+
+
 def new_case(
     kind: str,
     *,
@@ -155,6 +171,7 @@ def new_case(
     planets: int | None = None,
     face_width: str | None = None,
     form: ToothForm | None = None,
+    steel: NamedSteel | None = None,
 ) -> str:
     """Write a commented case from a few numbers.
 
@@ -179,12 +196,15 @@ def new_case(
         By default twelve modules.
     form : ToothForm, optional
         Shifts, centre distance, helix and addendum, where they are given.
+    steel : NamedSteel, optional
+        Of all gears; without it a case says what its safeties need.
 
     Raises
     ------
     CaseError, GeometryError
         Another kind (E-CHOICE), other numbers of teeth or shifts (E-COUNT), options that it has not
-        (E-ARGUMENTS), planets that equal spacing does not allow (E-ASSEMBLY), and what makes no case.
+        (E-ARGUMENTS), planets that equal spacing does not allow (E-ASSEMBLY), teeth that no shifts close
+        (E-COAXIAL), and what makes no case.
     """
     given = {"teeth": teeth, "module": module, "planets": planets, "face-width": face_width}
     given |= {"torque": torque, "speed": speed}
@@ -193,11 +213,11 @@ def new_case(
     of_set, notes = len(teeth) == 3, _usual_notes(given)
     module, speed = "2 mm" if module is None else module, "1000 rpm" if speed is None else speed
     if kind in PLANET_KINDS:
-        return _planets_text(kind, teeth, module, given | {"speed": speed})
+        return _planets_text(kind, teeth, module, given | {"speed": speed}, steel)
     size, beta = _read(Module, module, "--module"), math.radians(20.0) if kind == "helical" else 0.0
     beta = beta if form.helix is None else _read(Angle, form.helix, "--helix")
     width = 12.0 * size if face_width is None else _read(FaceWidth, face_width, "--face-width")
-    gears, of_all, lacks = _gears(teeth, size, beta, form, notes)
+    gears, of_all, lacks = _gears(teeth, size, beta, form, notes, planets)
     of_all["set"] |= {"backlash": _millimetres(BACKLASH * size), "face_width": LENGTH.show(width)}
     tables: dict[str, Any] = {"format": 1, "title": f"{kind.capitalize()} {'/'.join(map(str, teeth))}"}
     tables |= {**of_all, "material": _STEEL, **_sections(gears, of_all, size, beta, notes)}
@@ -223,10 +243,26 @@ def new_case(
     left = [f"--{key} {value}" for key, value in taken.items() if not given[key] and (of_set or key != "planets")]
     shape = {"drivetrain": _in_time, "gearbox": pair_in_gearbox}.get(kind)
     tables = tables if shape is None else shape(tables, notes)
-    return draft_text(tables, notes, word="estimated", head=_head(kind, left, lacks, form))
+    head = _head(kind, left, lacks, form, rated=steel is not None)
+    return draft_text(_of_steel(tables, steel), notes, word="estimated", head=head)
 
 
-def _planets_text(kind: str, teeth: tuple[int, ...], module: str, given: Mapping[str, Any]) -> str:
+def _of_steel(tables: Any, steel: NamedSteel | None) -> Any:
+    """Give tables whose materials, of a gearbox those within its pairs, are of a steel; as they are without one."""
+    if steel is None or not isinstance(tables, (dict, list)):
+        return tables
+    if isinstance(tables, list):
+        return [_of_steel(table, steel) for table in tables]
+    changed = {name: _of_steel(table, steel) for name, table in tables.items()}
+    if "material" in changed:
+        named = {name: value for name, value in changed["material"].items() if name != "estimated"}
+        changed["material"] = named | {"treatment": steel.treatment, "hardness": steel.hardness}
+    return changed
+
+
+def _planets_text(
+    kind: str, teeth: tuple[int, ...], module: str, given: Mapping[str, Any], steel: NamedSteel | None
+) -> str:
     """Write a gearbox with planets around a carrier."""
     size, notes = _read(Module, module, "--module"), dict[str, str]()
     width = 12.0 * size if given["face-width"] is None else _read(FaceWidth, given["face-width"], "--face-width")
@@ -245,7 +281,7 @@ def _planets_text(kind: str, teeth: tuple[int, ...], module: str, given: Mapping
         notes["operation.load_case[0].torque"] = "estimated: K factor of 1 N/mm^2"
     head = [_HEAD.format(kind) + _STANDS, "Assumed: " + " ".join(f"--{key} {value}" for key, value in taken.items())]
     head.append("Every planet is a shaft on the carrier, every mesh a pair; gears have no profile shift.")
-    return draft_text(tables, notes, word="estimated", head=[*head, *faults])
+    return draft_text(_of_steel(tables, steel), notes, word="estimated", head=[*head, *faults])
 
 
 def _of_kind(kind: str, beta: float, slices: int, notes: dict[str, str]) -> dict[str, Any]:
@@ -268,9 +304,10 @@ def _has_normal_section(tables: dict[str, object], beta: float) -> bool:
     return True
 
 
-def _head(kind: str, left: list[str], lacks: tuple[str, ...], form: ToothForm) -> list[str]:
-    """Paragraphs before the first entry: what is assumed, and what teeth lack whatever their shifts."""
-    head = [_HEAD.format(kind) + {"drivetrain": _STANDS, "gearbox": _STANDS}.get(kind, _LEAVE), _STRENGTH]
+def _head(kind: str, left: list[str], lacks: tuple[str, ...], form: ToothForm, *, rated: bool) -> list[str]:
+    """Paragraphs before the first entry: what is assumed or missing, and what teeth lack whatever their shifts."""
+    head = [_HEAD.format(kind) + {"drivetrain": _STANDS, "gearbox": _STANDS}.get(kind, _LEAVE)]
+    head += [] if rated else [_STRENGTH]
     head += [f"Assumed: {' '.join(left)}"] if left else []
     if lacks:
         place = "" if form.centre_distance is None else " at this centre distance"
@@ -353,7 +390,7 @@ def _no_such(kind: str, option: str, words: str) -> CaseError:
 
 
 def _gears(
-    teeth: tuple[int, ...], size: float, beta: float, form: ToothForm, notes: dict[str, str]
+    teeth: tuple[int, ...], size: float, beta: float, form: ToothForm, notes: dict[str, str], planets: int | None
 ) -> tuple[list[dict[str, Any]], dict[str, Any], tuple[str, ...]]:
     """Teeth, shift (that for the rim too) and rack of every gear, tables of all of them, what they lack."""
     names = ("sun", "planet", "ring") if len(teeth) == 3 else ("gear_1", "gear_2")
@@ -378,9 +415,14 @@ def _gears(
         return gears, of_all | _rack_table(form.addendum, notes), ()
     module, alpha = transverse_tool(size, math.radians(20.0), beta)
     step = 10.0 ** (math.floor(math.log10(1e3 * size)) - 5) / module
-    addendum, shared = _shared_shifts(
-        teeth, alpha, beta, form, step=step, distance=None if distance is None else distance / module
-    )
+    try:
+        addendum, shared = _shared_shifts(
+            teeth, alpha, beta, form, step=step, distance=None if distance is None else distance / module
+        )
+    except GeometryError as error:
+        if distance is None and len(teeth) == 3 and abs(teeth[2] - teeth[0] - 2 * teeth[1]) > 1:
+            raise _not_coaxial(teeth, planets) from error
+        raise
     if form.addendum is not None or addendum != ADDENDA[0]:
         of_all |= _rack_table(addendum, notes)
     if form.addendum is None:
@@ -544,6 +586,24 @@ def _unequal(teeth: tuple[int, ...], planets: int) -> CaseError:
         value=planets,
         limit=f"divisors of z_s + z_r = {total}",
         remedy="; ".join(remedies) or "fewer planets, or other teeth",
+    )
+
+
+def _not_coaxial(teeth: tuple[int, ...], planets: int | None) -> CaseError:
+    """Refuse teeth of a set that no profile shifts close, with the numbers near them that close without any."""
+    sun, planet, ring = teeth
+    counts = (3, 2, 1) if planets is None else (planets,)
+    count, near = next(((n, near) for n in counts if (near := coaxial_teeth(sun, planet, ring, n))), (0, []))
+    offered = " or ".join(" ".join(map(str, close)) for close in near[:3])
+    misfit = ring - sun - 2 * planet
+    return CaseError(
+        f"no profile shifts give sun, planet and ring of {sun}/{planet}/{ring} teeth one centre distance: "
+        f"z_r - z_s - 2 z_p = {misfit}",
+        code="E-COAXIAL",
+        key="--teeth",
+        value=teeth,
+        limit="about z_r = z_s + 2 z_p",
+        remedy=f"with {count} planet{'s' * (count != 1)} --teeth {offered}" if near else "fewer planets, or other teeth",
     )
 
 

@@ -15,9 +15,11 @@ STEEL = {"treatment": "nitrided steel", "hardness": "700"}
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_every_kind_is_made_with_a_material_for_its_safeties(kind):
-    text, problems = drafted_case(kind, {"teeth": " ".join(map(str, KINDS[kind])), "module": "2 mm", **STEEL})
+    teeth = {"teeth": " ".join(map(str, KINDS[kind])), "module": "2 mm"}
+    text, problems = drafted_case(kind, teeth | STEEL)
     assert problems == {}
     check_case(parse_case(text))
+    assert "For safeties" not in text, "a case with a material does not ask for one"
     assert text.count('treatment = "nitrided steel"') == text.count("hardness = 700\n") == text.count("youngs_modulus")
 
 

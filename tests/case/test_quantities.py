@@ -8,7 +8,7 @@ from types import FunctionType
 import pytest
 
 from femgear.case import quantities
-from femgear.case.quantities import LENGTH, MASS, Number, to_si
+from femgear.case.quantities import LENGTH, MASS, Count, Number, to_si
 from femgear.errors import CaseError
 
 
@@ -74,6 +74,27 @@ def test_words_of_drawings_and_other_programs(text, si, value):
 
 
 @pytest.mark.parametrize(
+    ("given", "named", "remedy"),
+    [
+        (21.5, "21.5", None),
+        ("21.5", "21.5", None),
+        (27.0, "27.0", "write 27"),
+        ("27.0", "27.0", "write 27"),
+        ("27", "a text", "write it without quotes"),
+        ("27 teeth", "a text", None),
+        ("many", "a text", None),
+        (float("nan"), "a number", None),
+        (True, "true or false", None),
+    ],
+)
+def test_what_is_no_whole_number_is_named(given, named, remedy):
+    """What the remedy says is accepted, and what no remedy mends has none."""
+    with pytest.raises(CaseError, match=f"a whole number is needed, not {named}\n") as caught:
+        Count(5, 5000).read(given)
+    assert caught.value.code == "E-TYPE" and caught.value.limit == "5 to 5000" and caught.value.remedy == remedy
+
+
+@pytest.mark.parametrize(
     ("text", "dimension", "near"),
     [
         ("3 nm", quantities.TORQUE, "Nm"),
@@ -108,7 +129,7 @@ def test_slips_in_numbers_are_named(text, dimension, slip, usual):
     assert quantities.to_si("1450 1/min", quantities.SPEED) == pytest.approx(1450 * quantities.RPM)
 
 
-@pytest.mark.parametrize(("text", "usual"), [("5 %", "write 0.05"), ("5", "without quotes"), ("five", None)])
+@pytest.mark.parametrize(("text", "usual"), [("5 %", "write 0.05"), ("5", "without quotes"), ("5 mm", "without unit"), ("five", None)])
 def test_numbers_in_quotes(text, usual):
     with pytest.raises(CaseError, match="a number is needed") as caught:
         Number(0.0, 1.0).read(text)

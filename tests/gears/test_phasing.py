@@ -15,6 +15,7 @@ from femgear.gears.kinematics import orientations
 from femgear.gears.phasing import (
     ZERO,
     MeshPhasing,
+    coaxial_teeth,
     cyclic_harmonic,
     mesh_phasing,
     phase_factors,
@@ -251,3 +252,22 @@ def test_a_small_miss_is_told_with_its_digits():
     angles = np.add(equal_planet_angles(4), [0.0, 2e-6, 0.0, 0.0])
     with pytest.raises(GeometryError, match=r"by 3\.18e-05 teeth"):
         mesh_phasing(30, 70, angles)
+
+
+@pytest.mark.parametrize(("teeth", "planets"), [((17, 30, 91), 3), ((20, 30, 60), 4), ((27, 45, 108), 2)])
+def test_coaxial_teeth_make_sets_of_unshifted_gears(teeth, planets):
+    """Gears made of them run without play at one distance, at equal angles, and their tips stay apart."""
+    near = coaxial_teeth(*teeth, planets)
+    assert len(near) >= 3 and len({*near}) == len(near)
+    for sun, planet, ring in near[:4]:
+        geared_set = geared(sun, planet, ring, equal_planet_angles(planets))
+        assert geared_set.ring.profile_shift == pytest.approx(0.0, abs=1e-9)
+        step = 2.0 * geared_set.centre_distance * math.sin(math.pi / planets)
+        assert mesh_phasing(sun, ring, equal_planet_angles(planets)).equally_spaced
+        assert step > geared_set.planet.module * (planet + 2)
+    changed = [sum(new != old for new, old in zip(choice, teeth, strict=True)) for choice in near]
+    assert changed == sorted(changed)
+
+
+def test_planets_without_room_have_no_coaxial_teeth():
+    assert coaxial_teeth(17, 37, 91, 5) == []

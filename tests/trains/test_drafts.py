@@ -171,6 +171,19 @@ def test_masses_follow_other_teeth_once_their_lines_are_deleted(kind):
         assert [one.code for one in case.notices if one.code] == ["W-ESTIMATED"]
 
 
+@pytest.mark.parametrize(("teeth", "planets"), [((17, 30, 91), None), ((20, 30, 60), 4)])
+def test_teeth_without_one_centre_distance_are_told_what_closes(teeth, planets):
+    """All teeth of the remedy make cases without a profile shift of more than half a module."""
+    with pytest.raises(CaseError, match="E-COAXIAL") as caught:
+        new_case("planetary", teeth=teeth, planets=planets)
+    assert caught.value.key == "--teeth" and f"with {planets or 3} planets --teeth" in caught.value.remedy
+    offered = caught.value.remedy.partition("--teeth ")[2].split(" or ")
+    assert len(offered) == 3
+    for numbers in offered:
+        case = parse_case(new_case("planetary", teeth=tuple(map(int, numbers.split())), planets=planets))
+        assert max(abs(gear.profile_shift) for gear in planetary_set(case).gears) < 0.7
+
+
 def test_remarks_do_not_change_the_tables():
     tables = {"a": 1, "b": {"c": [1, 2], "d": {"e": "x"}}, "f": [{"g": 1, "h": {"i": 2.5}}, {"g": 3}]}
     text = write(tables, {"b.c": "why\nnot", "f[1].g": "last"})

@@ -18,7 +18,7 @@ from femgear.case.checks import runup_range
 from femgear.case.csv_columns import refuse_other_files
 from femgear.case.gear_set import planetary_set, set_deviations
 from femgear.case.planetary import Case, check_floating, output_member
-from femgear.case.quantities import RPM
+from femgear.case.quantities import ANGLE, RPM
 from femgear.case.sections import SupportSection
 from femgear.case.tooth_friction import no_acting_friction
 from femgear.errors import CaseError
@@ -301,6 +301,7 @@ def case_warnings(case: Case) -> Iterator[Finding]:
             "without damping resonances have no limit, and levels depend on how near a line lies to one",
             remedy="0.02 to 0.05 is usual",
         )
+    yield from _assumed_for_levels(case)
     yield from _wound_up(case)
     if case.planet.bearing_clearance and case.operation.fixed == "ring":
         yield Finding(
@@ -315,6 +316,39 @@ def case_warnings(case: Case) -> Iterator[Finding]:
             "housing.points",
             f"{case.housing.points} points do not resolve the ring's {MAX_DIAMETER} nodal diameters",
             remedy=f"use more than {2 * MAX_DIAMETER}",
+        )
+
+
+def _assumed_for_levels(case: Case) -> Iterator[Finding]:
+    """Say what levels and dB(A) rest on where the case leaves it to defaults (W-ESTIMATED)."""
+    if case.operation.fixed != "ring":
+        return
+    ratio, microphone = case.dynamics.damping_ratio, case.housing.microphone
+    if "damping_ratio" not in case.dynamics.model_fields_set:
+        yield Finding(
+            "W-ESTIMATED",
+            "dynamics.damping_ratio",
+            f"left out: levels rest on a damping ratio of {ratio:g} for all modes",
+            remedy="give it: 0.02 to 0.05 is usual",
+            concerns=f"damping ({ratio:g})",
+        )
+    if "housing" not in case.model_fields_set:
+        yield Finding(
+            "W-ESTIMATED",
+            "housing",
+            "left out: the ring on its foundation stands for the housing, with a sensor on its outer surface at "
+            f"{ANGLE.show(case.housing.sensor_angle)}",
+            remedy="give [housing] with supports or a structure, and the angle of the sensor",
+            concerns="housing (the ring alone)",
+        )
+    if "distance" not in microphone.model_fields_set:
+        distance = f"{microphone.distance:g} m"
+        yield Finding(
+            "W-ESTIMATED",
+            "housing.microphone.distance",
+            f"left out: dB(A) are those of a microphone {distance} from the outer surface of the ring",
+            remedy="give the distance at which it is heard",
+            concerns=f"distance of the microphone ({distance})",
         )
 
 
