@@ -38,6 +38,10 @@ _OUTSIDE = re.compile(r"^(/|~|\\|[A-Za-z]:[\\/])|(^|[\\/])\.\.([\\/]|$)")
 """Texts that name a place outside of the folder."""
 
 
+class CommandRefused(Exception):
+    """A command refused what a tool asked of it, in its own words."""
+
+
 def place_in(folder: Path, name: str) -> Path:
     """Find a file or folder by its name in a folder.
 
@@ -46,7 +50,7 @@ def place_in(folder: Path, name: str) -> Path:
     CaseError
         E-FILE: a name that leads out of the folder, or is none.
     """
-    if not _NAME.fullmatch(name) or not (folder / name).resolve().is_relative_to(folder.resolve()):
+    if not _is_at_hand(folder, name):
         raise CaseError(
             "only files of one folder are at hand",
             code="E-FILE",
@@ -55,6 +59,11 @@ def place_in(folder: Path, name: str) -> Path:
             limit="letters, digits, blanks and . _ - in each part, inside of the folder",
         )
     return (folder / name).resolve()
+
+
+def _is_at_hand(folder: Path, name: str) -> bool:
+    """Whether a name of a folder is one that tools take: no link that leads out of it."""
+    return bool(_NAME.fullmatch(name)) and (folder / name).resolve().is_relative_to(folder.resolve())
 
 
 def _word(text: str) -> str:
@@ -96,6 +105,14 @@ def _texts(value: Any, path: str = "") -> list[tuple[str, str]]:
     return []
 
 
+def _new_case_path(folder: Path, name: str) -> Path:
+    """Find the place of a case file that a tool writes (CaseError, E-FILE)."""
+    path = place_in(folder, name)
+    if path.suffix != ".toml" or path.parent != folder.resolve():
+        raise CaseError("case files stand in the folder and end in .toml", code="E-FILE", key="name", value=name[:100])
+    return path
+
+
 def command(folder: Path, *arguments: str) -> dict[str, Any]:
     """Run a command of femgear in a folder: exit code, what it printed, as data where that is JSON, and messages."""
     try:
@@ -117,6 +134,14 @@ def command(folder: Path, *arguments: str) -> dict[str, Any]:
     return {"exit_code": done.returncode, "data": data, "messages": done.stderr[-MOST_TEXT:]}
 
 
+def _answered(folder: Path, *arguments: str) -> dict[str, Any]:
+    """Run a command as `command` does; a refusal that leaves no data is one of the tool (CommandRefused)."""
+    done = command(folder, *arguments)
+    if done["exit_code"] and not isinstance(done["data"], dict):
+        raise CommandRefused(done["messages"].strip() or f"the command ended with exit code {done['exit_code']}")
+    return done
+
+
 def make_server(folder: Path) -> MCPServer:
     """Make the server of a folder, with the tools list, read, write, new, check, run, results, compare and explain.
 
@@ -136,7 +161,7 @@ def make_server(folder: Path) -> MCPServer:
         def refusing(*arguments: Any, **named: Any) -> Any:
             try:
                 return tool(*arguments, **named)
-            except (FemgearError, OSError, UnicodeError) as error:
+            except (FemgearError, OSError, UnicodeError, CommandRefused) as error:
                 raise ToolError(str(error)) from error
 
         return refusing
@@ -187,8 +212,14 @@ def _tools(folder: Path) -> list[Callable[..., Any]]:
 
     def list_files() -> list[str]:
         """List case files and folders of results."""
-        paths = sorted(path for path in folder.iterdir() if path.suffix == ".toml" or (path / "manifest.json").exists())
-        return [path.name for path in paths[:MOST_FILES]]
+        names = sorted(path.name for path in folder.iterdir())
+        places = [(name, place_in(folder, name)) for name in names if _is_at_hand(folder, name)]
+        listed = [
+            name
+            for name, path in places
+            if (path.suffix == ".toml" and path.is_file()) or (path / "manifest.json").is_file()
+        ]
+        return listed[:MOST_FILES]
 
     def read_case(name: str) -> str:
         """Read a case file, TOML text."""
@@ -196,17 +227,17 @@ def _tools(folder: Path) -> list[Callable[..., Any]]:
 
     def write_case(name: str, text: str) -> str:
         """Write or replace a case file, whose name ends in .toml; check it afterwards."""
-        path = place_in(folder, name)
-        if path.suffix != ".toml" or path.parent != folder.resolve():
-            raise CaseError("case files stand in the folder and end in .toml", code="E-FILE", key="name", value=name)
+        path = _new_case_path(folder, name)
         check_text(text)
         files.write_text(text, path)
         return f"written: {name}"
 
     def new(kind: str, name: str) -> dict[str, Any]:
         """Write a commented case of a kind; edit and check it."""
-        place_in(folder, name)
-        return command(folder, "new", _word(kind), "-o", name)
+        if _new_case_path(folder, name).exists():
+            remedy = "take another name; write_case replaces a file"
+            raise CaseError("the file is there already", code="E-OUTPUT", key="name", value=name, remedy=remedy)
+        return _answered(folder, "new", _word(kind), "-o", name)
 
     new.__doc__ = f"{new.__doc__} Kinds: {', '.join(KINDS)}."
 
@@ -220,21 +251,21 @@ def _tools(folder: Path) -> list[Callable[..., Any]]:
         check_text(text_of(name))
         place_in(folder, results)
         stage = ("--only", _word(only)) if only else ()
-        return command(folder, "run", name, "-o", results, "--json", "--force", *stage)
+        return _answered(folder, "run", name, "-o", results, "--json", "--force", *stage)
 
     def results(folder_name: str) -> dict[str, Any]:
         """Tell what decides about a finished run: answers with limits, findings, key figures, files."""
         place_in(folder, folder_name)
-        return command(folder, "report", folder_name, "--json")
+        return _answered(folder, "report", folder_name, "--json")
 
     def compare(first: str, second: str, output: str) -> dict[str, Any]:
         """Compare two folders of results; writes compare.html into a folder."""
         for name in (first, second, output):
             place_in(folder, name)
-        return command(folder, "compare", first, second, "-o", output)
+        return _answered(folder, "compare", first, second, "-o", output)
 
     def explain(code: str) -> dict[str, Any]:
         """Say what a code of a refusal (E-...) or a warning (W-...) means."""
-        return command(folder, "explain", _word(code))
+        return _answered(folder, "explain", _word(code))
 
     return [list_files, read_case, write_case, new, check, run, results, compare, explain]

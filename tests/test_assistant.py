@@ -121,8 +121,47 @@ def test_refused_calls_say_what_is_needed_and_leave_nothing(tmp_path, commands_r
     assert "[E-ARGUMENTS] run: " in answers[0][0] and "name is missing, results is missing" in answers[0][0]
     assert "texts: name, results, only (may be missing)" in answers[0][0] and "pydantic" not in answers[0][0]
     assert "name is no text" in answers[1][0] and "[E-FILE] name: " in answers[2][0]
-    assert [error for _, error in answers] == [True, True, True, False]
-    assert json.loads(answers[3][0])["exit_code"] == 4 and not [*tmp_path.iterdir()]
+    assert all(error for _, error in answers) and "no such results folder" in answers[3][0]
+    assert not [*tmp_path.iterdir()]
+
+
+def test_what_is_listed_can_be_read(tmp_path, commands_run_here):
+    """Links that lead out of the folder, and names that no tool takes, are not listed."""
+    folder = tmp_path / "inside"
+    folder.mkdir()
+    for place in (tmp_path, folder):
+        (place / "results").mkdir()
+        (place / "results" / "manifest.json").write_text("{}", encoding="utf-8")
+        (place / "case.toml").write_text("format = 1", encoding="utf-8")
+    (folder / "out.toml").symlink_to(tmp_path / "case.toml")
+    (folder / "out").symlink_to(tmp_path / "results")
+    (folder / "gone.toml").symlink_to(folder / "absent.toml")
+    (folder / "ä.toml").write_text("format = 1", encoding="utf-8")
+    (folder / ".case.toml").write_text("format = 1", encoding="utf-8")
+    (folder / "same.toml").symlink_to("case.toml")
+    _, ((listed, error),) = asked(make_server(folder), ("list_files", {}))
+    names = "case.toml", "results", "same.toml"
+    assert not error and listed == "".join(names)
+    _, answers = asked(make_server(folder), *(("read_case", {"name": name}) for name in (names[0], names[2])))
+    assert [(text, error) for text, error in answers] == [("format = 1", False)] * 2
+
+
+def test_refusals_of_new_and_explain_are_refusals_of_the_tool(tmp_path, commands_run_here):
+    """They name what the tool has: no option of the command line."""
+    (tmp_path / "own.toml").write_text("format = 1", encoding="utf-8")
+    _, answers = asked(
+        make_server(tmp_path),
+        ("new", {"kind": "pair", "name": "own.toml"}),
+        ("new", {"kind": "nonsense", "name": "other.toml"}),
+        ("new", {"kind": "pair", "name": "other"}),
+        ("explain", {"code": "W-PULLL"}),
+        ("results", {"folder_name": "absent"}),
+    )
+    assert all(error for _, error in answers)
+    words = "write_case replaces", "planetary, pair", "end in .toml", "W-PULL or", "no such results folder"
+    assert all(word in text for word, (text, _) in zip(words, answers, strict=True))
+    assert not any("--" in text or " -o" in text for text, _ in answers)
+    assert (tmp_path / "own.toml").read_text(encoding="utf-8") == "format = 1" and len([*tmp_path.iterdir()]) == 1
 
 
 def test_the_kinds_of_new_are_those_of_the_command(tmp_path):

@@ -243,6 +243,13 @@ def test_a_run_is_smooth_unless_teeth_part_or_motions_grow():
     pulled.findings = (Finding("W-OPEN", "", "planet 2 carries nothing"),)
     unloaded = judge_smoothness("", pulled, ("dynamics",), SPEEDS)
     assert (unloaded.state, unloaded.answer) == ("look", "a planet carries nothing at some positions")
+    # of what was assumed motions rest on the damping, not on the place where they are heard
+    pulled.findings = (
+        Finding("W-ESTIMATED", "dynamics.damping_ratio", "left out", concerns="damping (0.05)"),
+        Finding("W-ESTIMATED", "housing.microphone.distance", "left out", concerns="distance of the microphone (1 m)"),
+    )
+    rests_on = "teeth stay in contact; rests on estimated damping (0.05)"
+    assert judge_smoothness("", pulled, ("dynamics",)).answer == rests_on
     # of motions whose stability nothing tells nothing is said
     pulled.findings = ()
     assert judge_smoothness("", pulled, ("dynamics",), SPEEDS).answer == "teeth stay in contact"

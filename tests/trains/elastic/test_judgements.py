@@ -10,7 +10,9 @@ import xarray as xr
 from femgear.findings import DOUBT, Finding
 from femgear.stages.judgements import QUIET
 from femgear.trains.elastic.judgements import set_with_ring_judgements
-from femgear.trains.reading import read_case, with_values
+from femgear.trains.drafts import new_case
+from femgear.trains.elastic.checks import case_warnings
+from femgear.trains.reading import parse_case, read_case, with_values
 
 CASE = Path(__file__).parents[3] / "cases" / "planetary_27_40_108.toml"
 CARRIER = 2.0 * np.pi * 10.0
@@ -166,3 +168,25 @@ def test_no_line_stands_out_of_many_and_a_far_mode_is_not_named(results):
     results.runup["distance"].values[1] = 12.0
     sentence = judged(results).sentence
     assert "no line stands out, the largest line, 2,160 Hz (mesh harmonic 2), makes 6 % of" in sentence
+
+
+@pytest.mark.parametrize(
+    ("given", "assumed"),
+    [
+        ("", ["damping (0.05)", "housing (the ring alone)", "distance of the microphone (1 m)"]),
+        ("[dynamics]\ndamping_ratio = 0.03\n", ["housing (the ring alone)", "distance of the microphone (1 m)"]),
+        ("[housing]\nsensor_angle = \"30 deg\"\n", ["damping (0.05)", "distance of the microphone (1 m)"]),
+        ("[dynamics]\ndamping_ratio = 0.03\n[housing.microphone]\ndistance = \"2 m\"\n", []),
+    ],
+)
+def test_a_level_says_what_was_assumed_where_the_case_gives_none(results, given, assumed):
+    results.case = parse_case(new_case("planetary") + "\n" + given)
+    results.findings = tuple(case_warnings(results.case))
+    assert [finding.concerns for finding in results.findings if finding.code == "W-ESTIMATED"] == assumed
+    limit = judged(results).limit
+    assert all(words in limit for words in assumed) and ("rests on estimated" in limit) == bool(assumed)
+
+
+def test_a_published_set_assumes_its_microphone_alone():
+    assumed = [finding for finding in case_warnings(read_case(CASE)) if finding.code == "W-ESTIMATED"]
+    assert [finding.key for finding in assumed] == ["housing.microphone.distance"]
