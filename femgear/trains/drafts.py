@@ -592,7 +592,7 @@ def _unequal(teeth: tuple[int, ...], planets: int) -> CaseError:
 def _not_coaxial(teeth: tuple[int, ...], planets: int | None) -> CaseError:
     """Refuse teeth of a set that no profile shifts close, with the numbers near them that close without any."""
     sun, planet, ring = teeth
-    counts = (3, 2, 1) if planets is None else (planets,)
+    counts = (3, 2) if planets is None else (planets,)
     count, near = next(((n, near) for n in counts if (near := coaxial_teeth(sun, planet, ring, n))), (0, []))
     offered = " or ".join(" ".join(map(str, close)) for close in near[:3])
     misfit = ring - sun - 2 * planet
@@ -603,7 +603,7 @@ def _not_coaxial(teeth: tuple[int, ...], planets: int | None) -> CaseError:
         key="--teeth",
         value=teeth,
         limit="about z_r = z_s + 2 z_p",
-        remedy=f"with {count} planet{'s' * (count != 1)} --teeth {offered}" if near else "fewer planets, or other teeth",
+        remedy=f"with {count} planets --teeth {offered}" if near else "fewer planets, or other teeth",
     )
 
 

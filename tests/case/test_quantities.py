@@ -129,7 +129,9 @@ def test_slips_in_numbers_are_named(text, dimension, slip, usual):
     assert quantities.to_si("1450 1/min", quantities.SPEED) == pytest.approx(1450 * quantities.RPM)
 
 
-@pytest.mark.parametrize(("text", "usual"), [("5 %", "write 0.05"), ("5", "without quotes"), ("5 mm", "without unit"), ("five", None)])
+@pytest.mark.parametrize(
+    ("text", "usual"), [("5 %", "write 0.05"), ("5", "without quotes"), ("5 mm", "without unit"), ("five", None)]
+)
 def test_numbers_in_quotes(text, usual):
     with pytest.raises(CaseError, match="a number is needed") as caught:
         Number(0.0, 1.0).read(text)

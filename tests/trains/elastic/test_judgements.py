@@ -9,9 +9,9 @@ import xarray as xr
 
 from femgear.findings import DOUBT, Finding
 from femgear.stages.judgements import QUIET
-from femgear.trains.elastic.judgements import set_with_ring_judgements
 from femgear.trains.drafts import new_case
 from femgear.trains.elastic.checks import case_warnings
+from femgear.trains.elastic.judgements import set_with_ring_judgements
 from femgear.trains.reading import parse_case, read_case, with_values
 
 CASE = Path(__file__).parents[3] / "cases" / "planetary_27_40_108.toml"
