@@ -175,8 +175,8 @@ def test_no_line_stands_out_of_many_and_a_far_mode_is_not_named(results):
     [
         ("", ["damping (0.05)", "housing (the ring alone)", "distance of the microphone (1 m)"]),
         ("[dynamics]\ndamping_ratio = 0.03\n", ["housing (the ring alone)", "distance of the microphone (1 m)"]),
-        ("[housing]\nsensor_angle = \"30 deg\"\n", ["damping (0.05)", "distance of the microphone (1 m)"]),
-        ("[dynamics]\ndamping_ratio = 0.03\n[housing.microphone]\ndistance = \"2 m\"\n", []),
+        ('[housing]\nsensor_angle = "30 deg"\n', ["damping (0.05)", "distance of the microphone (1 m)"]),
+        ('[dynamics]\ndamping_ratio = 0.03\n[housing.microphone]\ndistance = "2 m"\n', []),
     ],
 )
 def test_a_level_says_what_was_assumed_where_the_case_gives_none(results, given, assumed):
