@@ -46,7 +46,7 @@ WORDS = {
         edited("tolerance = 1e-6", "tolerance = 1e-13"),
         ("E-RANGE", "dynamics.tolerance", "from 1e-12 to 0.01"),
     ),
-    "an older format": (edited("format = 1", "format = 0"), ("E-RANGE", "format", "1 to 1")),
+    "an older format": (edited("format = 1", "format = 0"), ("E-RANGE", "format", "allowed: 1")),
     "a truth value for teeth": (
         edited("teeth = 27", "teeth = true"),
         ("E-TYPE", "sun.teeth", "not true or false", "found:   true", "5 to 5000"),
