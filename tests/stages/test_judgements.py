@@ -249,7 +249,7 @@ def test_a_run_is_smooth_unless_teeth_part_or_motions_grow():
         Finding("W-ESTIMATED", "housing.microphone.distance", "left out", concerns="distance of the microphone (1 m)"),
     )
     rests_on = "teeth stay in contact; rests on estimated damping (0.05)"
-    assert judge_smoothness("", pulled, ("dynamics",)).answer == rests_on
+    assert judge_smoothness("", pulled, ("dynamics",), SPEEDS).answer == rests_on
     # of motions whose stability nothing tells nothing is said
     pulled.findings = ()
     assert judge_smoothness("", pulled, ("dynamics",), SPEEDS).answer == "teeth stay in contact"
