@@ -578,5 +578,6 @@ def balance_line_origin(data: xr.Dataset, line: int) -> str:
     words.append(f"{data['origin'].values[line]}, mesh harmonic {harmonic:g}" if harmonic else "weight, torque:")
     if "turns" in data:
         turns = zip(data["carrier"].values, data["turns"].values[line], strict=True)
-        words += [f"{turn:{'+' if harmonic else ''}g} x carrier of {name}" for name, turn in turns if turn]
-    return " ".join(words)
+        form = ", side band {:+g} of {}" if harmonic else " {:g} x carrier of {}"
+        words += [form.format(turn, name) for name, turn in turns if turn]
+    return "".join(words)

@@ -724,6 +724,12 @@ def named_load_case(name: str) -> str:
     return name if name.lower().startswith("load case") else f"load case {name}"
 
 
+def of_stage(part: str, stage: str) -> str:
+    """Name a gear, a root or a flank of a stage: ``"gear 1 of first stage"``, ``"planet of second, sun side"``."""
+    gear, comma, side = part.partition(",")
+    return f"{gear} of {stage}{comma}{side}"
+
+
 @lru_cache(maxsize=64)
 def stage_case_of(text: str) -> Any:
     """Read the case of the teeth of a stage from the text of its tables.

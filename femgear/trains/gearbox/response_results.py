@@ -597,9 +597,9 @@ def main_way(data: xr.Dataset, sensor: int) -> str:
 
 
 def line_origin(data: xr.Dataset, line: int) -> str:
-    """Write where a line comes from: stage, mesh harmonic, turns of the carrier beside it."""
+    """Write where a line comes from: stage, mesh harmonic, side band by turns of the carrier beside it."""
     harmonic, band = float(data["harmonic"].values[line]), int(data["side_band"].values[line])
-    side = f" {'-' if band < 0 else '+'} {abs(band)} x carrier" if band else ""
+    side = f", side band {band:+d}" if band else ""
     return (
         f"{data['origin'].values[line]}, mesh harmonic {harmonic:g}{side}"
         if harmonic

@@ -19,7 +19,7 @@ from femgear.report.tables import Block, Marks, tabulate
 from femgear.stages.judgements import unrated_gears
 from femgear.stages.strength import OF_ROOTS, OF_TEETH, Rating, rate_case, rating_wanted
 from femgear.stages.strength_results import factor_names, kind_names, missing_notes, missing_of_all
-from femgear.trains.gearbox.case_file import BoxPlanetarySection, GearboxCase, PairSection, stage_case_of
+from femgear.trains.gearbox.case_file import BoxPlanetarySection, GearboxCase, PairSection, of_stage, stage_case_of
 from femgear.trains.gearbox.contact import StageContact, loaded_tables
 from femgear.trains.gearbox.deflection import Deflection
 from femgear.trains.gearbox.power import BoxFlow
@@ -115,7 +115,7 @@ def strength_contents(states: Sequence[Deflection]) -> tuple[dict[str, tuple], d
     for number, of_state in enumerate(ratings):
         for place, stage in enumerate(model.stages):
             for mesh, gear, flank, factor in _places(stage, of_state.get(stage.name)):
-                flanks[mesh][gear], dynamic[number, mesh] = f"{stage.name} {flank.name}", factor
+                flanks[mesh][gear], dynamic[number, mesh] = of_stage(flank.name, stage.name), factor
                 places[mesh] = place, flank.kind
                 values["iso_root_stress"][number, mesh, gear] = flank.root_stress
                 values["iso_contact_stress"][number, mesh, gear] = flank.contact_stress
@@ -157,7 +157,7 @@ def _unrated(states: Sequence[Deflection], ratings: Sequence[Mapping[str, Rating
         if rating is None or len({flank.gear for flank in rating.flanks}) == len(gears):
             yield stage.name
         else:
-            yield from (f"{stage.name} {gear}" for gear in gears)
+            yield from (of_stage(gear, stage.name) for gear in gears)
 
 
 def _places(stage: Any, rating: Rating | None) -> Iterator[tuple[int, int, Any, float]]:

@@ -27,7 +27,7 @@ from femgear.stages.tooth_spectra import (
     tooth_life_coordinates,
     tooth_life_variables,
 )
-from femgear.trains.gearbox.case_file import BoxPlanetarySection, GearboxCase, PairSection, teeth_of
+from femgear.trains.gearbox.case_file import BoxPlanetarySection, GearboxCase, PairSection, of_stage, teeth_of
 from femgear.trains.gearbox.deflection import Deflection
 from femgear.trains.gearbox.shared_gears import SharedGear, gear_loads, shared_gears, shared_spectra
 from femgear.trains.gearbox.strength import rated_stages, strength_of_stage
@@ -56,7 +56,7 @@ def stage_spectra(states: Sequence[Deflection]) -> tuple[RatedSpectrum, ...]:
         ]
         for rated in rated_spectra(teeth, loads, strength_of_stage(case, teeth)):
             if (stage.name, rated.name.partition(",")[0]) not in left_out:
-                spectra.append(replace(rated, name=f"{stage.name} {rated.name}"))
+                spectra.append(replace(rated, name=of_stage(rated.name, stage.name)))
     for gear in shared:
         spectra += _of_shared_gear(gear, states, ratings, shares)
     return tuple(spectra)
@@ -89,7 +89,7 @@ def stages_without_life(states: Sequence[Deflection], spectra: Sequence[RatedSpe
         teeth = teeth_of(stage.section)
         gears = {} if teeth is None else {name: name.replace("_", " ") for name in teeth.gear_names}
         named = {
-            gear: shared.get((stage.name, number), f"{stage.name} {title}")
+            gear: shared.get((stage.name, number), of_stage(title, stage.name))
             for number, (gear, title) in enumerate(gears.items())
         }
         lacking = [
@@ -100,7 +100,7 @@ def stages_without_life(states: Sequence[Deflection], spectra: Sequence[RatedSpe
         if len(lacking) == len(gears):
             yield stage.name
         else:
-            yield from (f"{stage.name} {gears[gear]}" for gear in lacking)
+            yield from (of_stage(gears[gear], stage.name) for gear in lacking)
 
 
 def tooth_life_contents(states: Sequence[Deflection]) -> tuple[dict[str, tuple], dict[str, tuple], dict[str, Any]]:

@@ -81,7 +81,7 @@ def test_tables_name_stages_sensors_and_the_origin_of_lines(data):
 
 def test_side_bands_are_turns_of_the_carrier(data):
     data["side_band"].values[0] = -3
-    assert line_origin(data, 0) == "stage, mesh harmonic 1 - 3 x carrier"
+    assert line_origin(data, 0) == "stage, mesh harmonic 1, side band -3"
     data["harmonic"].values[0] = 0
     data["side_band"].values[0] = 3
     assert line_origin(data, 0) == "stage, 3 x carrier"

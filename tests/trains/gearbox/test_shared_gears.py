@@ -102,8 +102,8 @@ def test_an_idler_bends_both_ways_and_each_flank_has_its_own_mate(idler):
     assert back.largest_ratio == pytest.approx(others, rel=1e-12)
     assert front.damage == pytest.approx(turns / LINES.contact_life.cycles_at(np.array(pressed)), rel=1e-12)
     # the gears at its sides keep their own spectra, the idler has none by its stages
-    assert {"stage gear 1", "second gear 2"} <= {name for _, name in spectra}
-    assert not {"stage gear 2", "second gear 1"} & {name for _, name in spectra}
+    assert {"gear 1 of stage", "gear 2 of second"} <= {name for _, name in spectra}
+    assert not {"gear 2 of stage", "gear 1 of second"} & {name for _, name in spectra}
 
 
 def test_safeties_of_an_idler_have_the_factor_of_alternating_bending(idler):

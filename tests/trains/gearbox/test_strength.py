@@ -129,7 +129,7 @@ def test_stages_and_gears_that_carry_without_a_safety_are_named(pair):
     cases = {"first": pair, "second": case, "third": with_values(case, gear_1), "idle": case}
     state = state_of(box(edition=2019), {name: contact_of(of, 100.0, [1.0]) for name, of in cases.items()})
     *_, attrs = strength_contents([state])
-    assert attrs["iso_unrated"] == "second | third gear 2"
+    assert attrs["iso_unrated"] == "second | gear 2 of third"
     assert attrs["iso_missing"] == "dynamic face transverse"
 
 
@@ -142,15 +142,15 @@ def test_files_hold_stresses_and_safeties_of_all_load_cases(data, pair):
     assert data["iso_root_safety"].values[1, 0, 1] == pytest.approx(rating.flanks[1].root_safety)
     assert data["iso_contact_safety"].values[1, 0, 0] == pytest.approx(rating.flanks[0].contact_safety)
     assert data["iso_dynamic_factor"].values[1, 0] == pytest.approx(rating.standard[0].dynamic.factor)
-    assert data["iso_flank"].values[4].tolist() == ["set planet, ring side", "set ring"]
+    assert data["iso_flank"].values[4].tolist() == ["planet of set, ring side", "ring of set"]
     (block,) = describe_strength(data, 1, "")
     assert [row[0] for row in block.rows] == [
-        "pair stage gear 1",
-        "pair stage gear 2",
-        "set sun",
-        "set planet, sun side",
-        "set planet, ring side",
-        "set ring",
+        "gear 1 of pair stage",
+        "gear 2 of pair stage",
+        "sun of set",
+        "planet of set, sun side",
+        "planet of set, ring side",
+        "ring of set",
     ]
     assert block.title.endswith("ISO 6336:2019")
 

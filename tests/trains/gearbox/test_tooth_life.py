@@ -50,9 +50,9 @@ def result():
 
 def test_spectra_are_those_of_the_loaded_states(result):
     spectra = {(rated.kind, rated.name): rated for rated in stage_spectra(result.states)}
-    assert list(spectra)[:2] == [("root", "stage gear 1"), ("root", "stage gear 2")]
-    assert ("flank", "stage gear 2, back flank") in spectra
-    root = spectra["root", "stage gear 2"]
+    assert list(spectra)[:2] == [("root", "gear 1 of stage"), ("root", "gear 2 of stage")]
+    assert ("flank", "gear 2 of stage, back flank") in spectra
+    root = spectra["root", "gear 2 of stage"]
     assert root.spectrum.cycles == pytest.approx(60.0 * np.array([50.0, 1200.0, 270.0]) * 24 / 36, rel=1e-12)
     for number, (state, torque) in enumerate(zip(result.states, (400.0, 100.0, 60.0), strict=True)):
         contact = state.contacts["stage"]
@@ -75,14 +75,15 @@ def test_the_file_has_lives_and_the_life_that_is_asked_for(result):
 
 def test_stages_and_gears_that_carry_without_a_life_are_named(result):
     of_gear_1 = [rated for rated in stage_spectra(result.states) if "gear 2" not in rated.name]
-    assert [*stages_without_life(result.states, of_gear_1)] == ["stage gear 2"]
+    assert [*stages_without_life(result.states, of_gear_1)] == ["gear 2 of stage"]
     assert [*stages_without_life(result.states, [])] == ["stage"]
 
 
 def test_a_gear_with_several_mates_has_its_life_under_a_name_with_commas(result, monkeypatch):
     shared = SharedGear("input", 24, (("stage", 0), ("other", 0)))
     spectra = [
-        replace(rated, name=rated.name.replace("stage gear 1", shared.name)) for rated in stage_spectra(result.states)
+        replace(rated, name=rated.name.replace("gear 1 of stage", shared.name))
+        for rated in stage_spectra(result.states)
     ]
     monkeypatch.setattr("femgear.trains.gearbox.tooth_life.shared_gears", lambda case: (shared,))
     assert "," in shared.name and not [*stages_without_life(result.states, spectra)]
