@@ -279,9 +279,11 @@ def judge_strength(
     in_sentence = ", ".join(
         f"{symbol} {least.value:.2f} {_AGAINST[symbol]} ({least.where})" for symbol, least, _ in rated
     )
+    margin = _load_margin(rated)
     limit = (
         f"{' and '.join(f'{symbol} at least {required:g}' for symbol, _, required in rated)}, ISO 6336:{limits.edition}"
     )
+    limit += f", reached at {margin:.2g} times the load" if math.isfinite(margin) else ""
     whole = [] if len(rated) == 2 else ["S_H" if rated[0][0] == "S_F" else "S_F"]
     missing = _not_rated([*whole, *(part for part in unrated if not part.startswith(tuple(whole)))])
     reasons = _doubts(findings, doubts)
@@ -290,12 +292,23 @@ def judge_strength(
         failing = " and ".join(
             f"{symbol} {least.value:.2f} {_AGAINST[symbol]} ({least.where})" for symbol, least, _ in low
         )
-        return Judgement(STRONG, "bad", answer, limit, f"Not strong enough: {failing}")
+        return Judgement(STRONG, "bad", answer, limit, f"Not strong enough, for {margin:.2g} times the load: {failing}")
     faulty = "W-FAULT" in doubts and bool(_raised(findings, ("W-FAULT",)))
     begin = "But for the faulty teeth strong enough" if faulty else "Strong enough"
     if missing:
-        return Judgement(STRONG, "look", answer, limit, f"{begin} as far as it is rated: {in_sentence}; {missing}")
-    return Judgement(STRONG, "look" if reasons else "good", answer, limit, f"{begin}: {in_sentence}")
+        rated_words = f"{begin} as far as it is rated, for {margin:.2g} times the load: {in_sentence}; {missing}"
+        return Judgement(STRONG, "look", answer, limit, rated_words)
+    sentence = f"{begin} for {margin:.2g} times the load: {in_sentence}"
+    return Judgement(STRONG, "look" if reasons else "good", answer, limit, sentence)
+
+
+def _load_margin(rated: Sequence[tuple[str, Least, float]]) -> float:
+    """Find how many times the load brings the first safety down to the one asked for, with the same load factors.
+
+    The root stress grows with the load and contact pressure with its square root (ISO 6336-2 and -3): the margin is
+    the smaller of S_F and S_H^2, each over what is asked for.
+    """
+    return min((least.value / required) ** (2.0 if symbol == "S_H" else 1.0) for symbol, least, required in rated)
 
 
 def judge_lives(
@@ -473,11 +486,26 @@ def _against(results: Any, stages: Sequence[str]) -> Iterator[str]:
 
 _FEW_HARMONICS = "mesh forces may change: too few harmonics or side bands were taken"
 """Of a run whose forces a longer excitation would change."""
+VOICES = (("a relaxed", 54.0), ("a normal", 60.0), ("a raised", 66.0), ("a loud", 72.0), ("a very loud", 78.0))
+"""Voices and their sound pressure levels 1 m before the mouth [dB(A)], the vocal efforts of ISO 9921:2003, annex A."""
+_STEP_OF_VOICES = 6.0
+"""From one voice to the next [dB]."""
 CLEAR = "no resonance makes the level at a speed of operation"
 MAKES_LEVEL = 0.5
 """Share of the level from which on one resonance makes it."""
 NEAR_RESONANCE = 10.0
 """Distance up to which a resonance counts at a speed of operation [%]."""
+
+
+def voice_words(level: float) -> str:
+    """Compare a sound pressure level [dB(A)] with the voice that is as loud, by `VOICES`; beyond them with the last."""
+    (quietest, lowest), (loudest, highest) = VOICES[0], VOICES[-1]
+    if level < lowest - 0.5 * _STEP_OF_VOICES:
+        return f"quieter than {quietest} voice 1 m away ({lowest:g} dB(A), ISO 9921)"
+    if level > highest + 0.5 * _STEP_OF_VOICES:
+        return f"louder than {loudest} voice 1 m away ({highest:g} dB(A), ISO 9921)"
+    voice, alike = min(VOICES, key=lambda of_voice: abs(level - of_voice[1]))
+    return f"as loud as {voice} voice 1 m away ({alike:g} dB(A), ISO 9921)"
 
 
 @dataclass(frozen=True)

@@ -25,6 +25,7 @@ from femgear.stages.judgements import (
     margins_of_levels,
     resonance_of_line,
     unrated_gears,
+    voice_words,
     without_life,
 )
 from femgear.stages.strength import OF_ROOTS
@@ -35,17 +36,23 @@ ROOT, FLANK = Least(1.92, "root of the planet"), Least(1.21, "flank of the sun")
 def test_safeties_are_judged_by_those_asked_for():
     asked = StrengthSection(required_root_safety=1.4, required_flank_safety=1.0)
     holds = judge_strength(ROOT, FLANK, asked)
-    assert holds.state == "good" and holds.limit == "S_F at least 1.4 and S_H at least 1, ISO 6336:2019"
+    assert holds.state == "good" and holds.limit == (
+        "S_F at least 1.4 and S_H at least 1, ISO 6336:2019, reached at 1.4 times the load"
+    )
     assert holds.sentence == (
-        "Strong enough: S_F 1.92 against breakage (root of the planet), S_H 1.21 against pitting (flank of the sun)"
+        "Strong enough for 1.4 times the load: S_F 1.92 against breakage (root of the planet), "
+        "S_H 1.21 against pitting (flank of the sun)"
     )
     more = StrengthSection(required_root_safety=2.0, required_flank_safety=1.25, edition=2006)
     fails = judge_strength(ROOT, FLANK, more)
-    assert fails.state == "bad" and fails.limit.endswith("ISO 6336:2006")
+    assert fails.state == "bad" and fails.limit.endswith("ISO 6336:2006, reached at 0.94 times the load")
     assert (
-        fails.sentence == "Not strong enough: S_F 1.92 against breakage (root of the planet) "
+        fails.sentence == "Not strong enough, for 0.94 times the load: S_F 1.92 against breakage (root of the planet) "
         "and S_H 1.21 against pitting (flank of the sun)"
     )
+    # root stress grows with the load, pressure with its root: at 0.94 = 1.21²/1.25² times the load S_H is 1.25
+    assert (1.21 / 1.25) ** 2 == pytest.approx(0.94, abs=0.005) and 1.92 / 2.0 > 0.94
+    assert "times the load" not in judge_strength(Least(math.nan, ""), FLANK, asked).limit
     # a safety that is exactly the one asked for holds, one without a number does not
     assert judge_strength(Least(1.4, ""), Least(1.0, ""), asked).state == "good"
     assert judge_strength(Least(math.nan, ""), FLANK, asked).state == "bad"
@@ -75,7 +82,10 @@ def test_gears_that_nothing_rates_deserve_a_look_and_are_named():
     assert unrated_gears(SimpleNamespace(flanks=flanks)) == ["gear 2", "S_F of the sun"]
     part = judge_strength(ROOT, FLANK, StrengthSection(), unrated=["gear 2"])
     assert part.state == "look" and part.limit.endswith("; gear 2 is not rated")
-    assert part.sentence.startswith("Strong enough as far as it is rated: ") and "; gear 2 is not" in part.sentence
+    assert (
+        part.sentence.startswith("Strong enough as far as it is rated, for 1.5 times the load: ")
+        and "; gear 2 is not" in part.sentence
+    )
     low = judge_strength(ROOT, FLANK, StrengthSection(required_root_safety=9.0), unrated=["gear 2"])
     assert low.state == "bad" and "gear 2" in low.limit
     # what no gear has is said once
@@ -88,7 +98,7 @@ def test_safeties_of_faulty_teeth_deserve_a_look():
     fault = Finding("W-FAULT", "planet.fault[0]", "text", severity=DOUBT)
     part = judge_strength(ROOT, FLANK, StrengthSection(), "", [fault], OF_ROOTS)
     assert part.state == "look" and "effects of a fault left out" in part.limit
-    assert part.sentence.startswith("But for the faulty teeth strong enough: ")
+    assert part.sentence.startswith("But for the faulty teeth strong enough for 1.5 times the load: ")
 
 
 def test_what_no_steel_carries_fails_whatever_its_safeties():
@@ -253,6 +263,20 @@ def test_a_run_is_smooth_unless_teeth_part_or_motions_grow():
     # of motions whose stability nothing tells nothing is said
     pulled.findings = ()
     assert judge_smoothness("", pulled, ("dynamics",), SPEEDS).answer == "teeth stay in contact"
+
+
+@pytest.mark.parametrize(
+    ("level", "words"),
+    [
+        (44.2, "quieter than a relaxed voice 1 m away (54 dB(A), ISO 9921)"),
+        (51.5, "as loud as a relaxed voice 1 m away (54 dB(A), ISO 9921)"),
+        (66.9, "as loud as a raised voice 1 m away (66 dB(A), ISO 9921)"),
+        (80.9, "as loud as a very loud voice 1 m away (78 dB(A), ISO 9921)"),
+        (95.0, "louder than a very loud voice 1 m away (78 dB(A), ISO 9921)"),
+    ],
+)
+def test_a_sound_pressure_level_is_compared_with_a_voice(level, words):
+    assert voice_words(level) == words
 
 
 def test_a_level_without_a_limit_is_judged_by_resonances_alone():

@@ -23,11 +23,13 @@ from femgear.stages.judgements import (
     judge_numbers,
     margins_of_levels,
     resonance_of_line,
+    voice_words,
 )
 from femgear.stages.train_judgements import judge_teeth
 from femgear.trains.elastic.results import known_factors, level_changes, level_doubts, marked_level, rate_set
 from femgear.trains.elastic.runup import loudest
 
+_OPEN = f"{CLEAR}; housing.level_limit or housing.microphone.level_limit gives a limit"
 _STANDS_OUT = 0.1
 """Share of the power of all lines from which on the largest one stands out of them."""
 
@@ -49,9 +51,11 @@ def _noise(results: Any) -> Judgement:
     level, speeds = housing["level"].values, housing["speed"].values
     at = int(level.argmax())
     speed = float(speeds[at])
-    at_microphone = (
-        f" ({float(housing['pressure_level'][at]):.1f} dB(A) at the microphone)" if "pressure_level" in housing else ""
-    )
+    at_microphone, compared = "", ""
+    if "pressure_level" in housing:
+        sound = float(housing["pressure_level"][at])
+        at_microphone = f" ({sound:.1f} dB(A) at the microphone)"
+        compared = f", {voice_words(sound)}"
     marks = Marks(results.findings)
     size_words = f"{marked_level(results, at, marks, level_doubts(results, [at]).get(at, ()))} m/s²{at_microphone}"
     answer = f"{size_words} at {speed:,.4g} rpm"
@@ -73,7 +77,7 @@ def _noise(results: Any) -> Judgement:
         place = ", ".join(filter(None, (origin, _nearest_mode(results, hertz))))
         which = "its" if share >= _STANDS_OUT else "no line stands out, the"
         cause = f"{which} largest line, {hertz:,.0f} Hz ({place}), makes {percent(share)} of the power"
-    sentence = f"At {speed:,.4g} rpm the housing has {_bound_in_words(size_words)}: {cause}"
+    sentence = f"At {speed:,.4g} rpm the housing has {_bound_in_words(size_words)}{compared}: {cause}"
     if decisive := most_decisive(results):
         sentence += f", with half and twice of what is assumed: {decisive}"
     margins, levels = tuple(_margins(results)), [size_words]
@@ -83,7 +87,7 @@ def _noise(results: Any) -> Judgement:
     # a bound has no mark: it is one itself
     doubts = [*([CATALOGUE["W-EXCITATION"].words] if any(map(is_bound, levels)) else []), *marks.words]
     rests_on = estimates_words(results.findings)
-    return judge_noise(answer, sentence, resonance, CLEAR, margins, doubt_words(doubts), rests_on)
+    return judge_noise(answer, sentence, resonance, _OPEN, margins, doubt_words(doubts), rests_on)
 
 
 def _bound_in_words(level: str) -> str:
