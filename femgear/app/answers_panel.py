@@ -60,6 +60,8 @@ class AnswersPanel:
         self._outbox: list[dict[str, Any]] = []
         # whether a slider made the latest change
         self._dragged = False
+        # when what is answered was asked for; charts that are chosen meanwhile ask for no other answer
+        self._asked_at: float | None = None
         with ui.row().classes("w-full items-center gap-2 q-px-sm"):
             self._charts = ui.select([], label="Charts", multiple=True, on_change=self._chosen_charts)
             self._charts.props("dense options-dense use-chips").classes("grow")
@@ -90,6 +92,7 @@ class AnswersPanel:
     def ask(self, *, dragged: bool = False) -> None:
         """Ask for an answer to a changed text, which a slider may have changed."""
         self._dragged = dragged
+        self._asked_at = time.perf_counter()
         self._changed.set()
 
     def stop(self) -> None:
@@ -132,11 +135,14 @@ class AnswersPanel:
                     await self._answer(text, name, dragged)
                 except WorkerError as error:
                     self._drawn.clear()  # another process numbers its results anew
-                    self._send([{"what": "end", "text": str(error)}])
+                    self._end(text=str(error))
 
     async def _answer(self, text: str, name: str, dragged: bool) -> None:
         """Look at a text, and compute what it can answer: of one that a slider makes first a draft."""
         start = time.perf_counter()
+        asked_at = self._asked_at = start if self._asked_at is None else self._asked_at
+        if not self._seen:
+            self._send([{"what": "begin", "text": "reading the case"}])
         async for seen in self._bench.ask("look", text, name):
             if name == self._session.name:
                 self._seen = seen
@@ -146,9 +152,9 @@ class AnswersPanel:
         if name != self._session.name or not self._seen:
             return
         if self._seen["problems"]:
-            self._send([{"what": "end", "text": "The case is refused: see what is wrong below the form."}])
+            self._end(text="The case is refused: see what is wrong below the form.")
             return
-        self._send([{"what": "begin"}])
+        self._send([{"what": "begin", "since": time.perf_counter() - asked_at}])
         if not self._gears:
             await self._show_gears(text, name)
         shown, stages = list(self._charts.value or ()), [stage["name"] for stage in self._seen["stages"]]
@@ -166,11 +172,14 @@ class AnswersPanel:
         while (part := await self._next(parts, superseded)) is not None:
             if name != self._session.name:
                 return
+            if self._show_step(part):
+                continue
             self._show_part(part)
             drawn = drawn or not part["same"]
         if self._changed.is_set():
             return
-        await self._rest(text, name, start)
+        self._end(seconds=time.perf_counter() - asked_at)
+        await self._rest(text, name)
 
     async def _draft(self, text: str, name: str, shown: Sequence[str]) -> bool:
         """Show what few positions say, which counts until the whole answer is there; tells whether there was need."""
@@ -178,14 +187,20 @@ class AnswersPanel:
         async for part in self._bench.ask("draft", text, name, shown, dict(self._drawn)):
             if name != self._session.name:
                 return True
+            if self._show_step(part):
+                continue
             self._show_part(part)
             self._send([{"what": "draft", "positions": part["positions"]}])
             drafted = True
         return drafted
 
-    async def _rest(self, text: str, name: str, start: float) -> None:
+    def _end(self, **said: float | str) -> None:
+        """Say that an answer is at its end, and why or how long it took since it was asked for."""
+        self._asked_at = None
+        self._send([{"what": "end", **said}])
+
+    async def _rest(self, text: str, name: str) -> None:
         """Let the case be heard and describe it, once all numbers are there."""
-        self._send([{"what": "end", "seconds": time.perf_counter() - start}])
         await self._show_gears(text, name)
         async for blocks in self._bench.ask("tables", text, name):
             self._send([{"what": "tables", "blocks": blocks}])
@@ -227,6 +242,14 @@ class AnswersPanel:
         if self._charts.options != options or self._charts.value != chosen:
             self._charts_offered = chosen
             self._charts.set_options(options, value=chosen)
+
+    def _show_step(self, part: dict[str, Any]) -> bool:
+        """Show which step is computed, where a part of an answer says that alone; tells whether it does."""
+        if "computing" not in part:
+            return False
+        share = f", {part['done']:.0f} of {part['total']:.0f}" if part["total"] > 1.0 else ""
+        self._send([{"what": "step", "text": f"computing: {words(part['computing']).lower()}{share}"}])
+        return True
 
     def _show_part(self, part: dict[str, Any]) -> None:
         """Show what became known with a stage."""

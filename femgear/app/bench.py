@@ -42,6 +42,10 @@ _HEADROOM = 4.0
 """Full scale of the sound over the largest sample of the first one: later ones may be louder."""
 
 
+_TOLD_EVERY = 0.3
+"""Between two words on the progress of a step [s]."""
+
+
 class Superseded(Exception):
     """A newer text waits: the answer to this one is not wanted any more."""
 
@@ -57,10 +61,21 @@ class Bench:
         Folder of generated grids.
     waiting : callable
         Whether a newer text waits, which ends the answer that is being computed.
+    tell : callable
+        Called with ``{"computing", "done", "total"}`` while an answer is computed: title of the stage, or name of a
+        step of it, and steps.
     """
 
-    def __init__(self, folder: Path, *, cache: Path | None = None, waiting: Callable[[], bool] = lambda: False):
-        self.folder, self._cache, self._waiting = folder, cache, waiting
+    def __init__(
+        self,
+        folder: Path,
+        *,
+        cache: Path | None = None,
+        waiting: Callable[[], bool] = lambda: False,
+        tell: Callable[[dict[str, Any]], None] = lambda progress: None,
+    ) -> None:
+        self.folder, self._cache, self._waiting, self._tell = folder, cache, waiting, tell
+        self._last_told = "", 0.0
         self._steps, self._seconds = Steps(), dict[str, float]()
         self._read: tuple[tuple[str, str], Any] | None = None
         self._latest = dict[str, tuple[Any, int]]()
@@ -106,6 +121,14 @@ class Bench:
         except FemgearError as error:
             seen["problems"] = _problems(error)
         return seen
+
+    def _computing(self, step: str, done: float = 0.0, total: float = 1.0) -> None:
+        """Tell what is computed where that is another step, and how far it is now and then; or give up."""
+        self._go_on()
+        former, at = self._last_told
+        if step != former or time.perf_counter() - at > _TOLD_EVERY:
+            self._last_told = step, time.perf_counter()
+            self._tell({"computing": step, "done": float(done), "total": float(total)})
 
     def tables(self, text: str, name: str) -> list[dict[str, Any]]:
         """Describe a case in tables, as ``femgear check`` does."""
@@ -177,7 +200,7 @@ class Bench:
         """Parts of an `answer` to a case."""
         check_case(case)
         train, of_run = train_of(case), {stage.name: stage for stage in stages_of(case)}
-        answer = Answer(case, self._steps, cache=self._cache, progress=self._go_on)
+        answer = Answer(case, self._steps, cache=self._cache, progress=self._computing)
         computed = dict[str, Any]()
         wanted = [of_run[key] for key in of_run if key in stages]
         taken = {name for stage in wanted for name in stage.before(case)}
@@ -185,7 +208,7 @@ class Bench:
         seconds = {stage.name: 0.0 if stage.name in taken else self._seconds.get(stage.name, 1.0) for stage in wanted}
         with _uncollected():
             for stage in (ordered := sorted(wanted, key=lambda stage: seconds[stage.name])):
-                self._go_on()
+                self._computing(stage.title)
                 start = time.perf_counter()
                 computed[stage.name] = answer[stage.name]
                 results = results_in_memory(case, computed, self.folder)

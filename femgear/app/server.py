@@ -17,6 +17,7 @@ from fastapi import FastAPI
 from fastapi.responses import FileResponse, HTMLResponse
 from nicegui import ui
 
+from femgear.app.session import Session
 from femgear.app.window import Window
 from femgear.assistant import place_in
 from femgear.errors import CaseError
@@ -97,6 +98,7 @@ def make_app(folder: Path, cache: Path | None) -> FastAPI:
     """
     application = FastAPI(docs_url=None, redoc_url=None, openapi_url=None)
     page = answers_page()
+    sessions = list[Session]()
 
     @application.get("/answers", response_class=HTMLResponse)
     def answers() -> str:
@@ -114,7 +116,7 @@ def make_app(folder: Path, cache: Path | None) -> FastAPI:
         return HTMLResponse(f"<pre>{escape(str(error))}</pre>", status_code=404)
 
     async def window() -> None:
-        await Window(folder, cache).build()
+        await Window(folder, cache, sessions).build()
 
     settings: Any = {"title": "femgear", "language": "en-US", "dark": None, "show_welcome_message": False}
     ui.run_with(application, root=window, reconnect_timeout=30.0, **settings)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import shlex
+import sys
 import tempfile
 from collections.abc import Mapping
 from html import escape
@@ -33,6 +34,7 @@ _CSS = """
 .absent > .q-expansion-item__container > .q-item { opacity: 0.6; }
 .fold { font-weight: 600; padding-left: 4px; }
 .more { font-size: 0.8rem; }
+.elsewhere { border: 2px solid #8a4b00; border-radius: 4px; }
 .explained { font-size: 0.8rem; max-width: 26rem; }
 .said { font-size: 0.8rem; white-space: pre-wrap; overflow-wrap: anywhere; }
 iframe { border: 0; width: 100%; flex: 1 1 auto; }
@@ -48,6 +50,8 @@ dialog.ended code { user-select: all; background: #8883; padding: 0.1em 0.3em; }
 """
 _KEPT_EVERY = 0.7
 """Between two looks after what is not saved [s]."""
+_BEGINS_AFTER = 0.2
+"""From the connection of a window to its first case [s]."""
 
 
 class Window:
@@ -59,10 +63,12 @@ class Window:
         Of case files and results.
     cache : path, optional
         Folder of generated grids.
+    sessions : list of Session
+        Those of all windows of the server.
     """
 
-    def __init__(self, folder: Path, cache: Path | None) -> None:
-        self.session = Session(folder)
+    def __init__(self, folder: Path, cache: Path | None, sessions: list[Session]) -> None:
+        self.session = Session(folder, sessions)
         self._bench = Worker(serve_bench, self.session.folder, cache)
         self._runs = Worker(serve_runs, self.session.folder)
 
@@ -82,10 +88,24 @@ class Window:
         ui.timer(_KEPT_EVERY, self._keep)
         client = ui.context.client
         client.on_delete(self._close)
+        client.on_disconnect(self._leave)
+        client.on_connect(self.session.come_back)
+        # a page that is loaded again is another window: by now the former one is gone
+        ui.timer(_BEGINS_AFTER, self._first, once=True)
+
+    def _first(self) -> None:
+        """Begin with the case edited last, or with a new one."""
         if name := first_shown(self.session.folder):
             self._open(name)
         else:
             self._new()
+
+    def _leave(self) -> None:
+        """Leave what is not saved to the next window, as this one has no connection."""
+        try:
+            self.session.leave()
+        except (FemgearError, OSError) as error:
+            print(f"femgear app: not kept: {error}", file=sys.stderr, flush=True)
 
     def _head(self) -> None:
         """The bar above: which case, and what can be done with it."""
@@ -114,7 +134,16 @@ class Window:
             run.props("unelevated dense no-caps color=accent")
 
     def _editor(self) -> None:
-        """The left side: form and text of the case, and what is wrong with it."""
+        """The left side: what other windows do with the case, its form and text, and what is wrong with it."""
+        with ui.column().classes("elsewhere w-full gap-1 p-2").props('role="alert"') as self._elsewhere:
+            self._elsewhere_text = ui.label().classes("said")
+            with ui.row().classes("gap-1"):
+                self._take = ui.button("Take these changes", on_click=self._take_changes)
+                self._stay = ui.button(on_click=self._stay_here)
+                self._back = ui.button("Take the saved file", on_click=self._discard)
+                for button in (self._take, self._stay, self._back):
+                    button.props("dense no-caps outline")
+        self._elsewhere.visible, self._stays = False, False
         with ui.tabs().props("dense no-caps align=left") as tabs:
             form, text = ui.tab("Form"), ui.tab("Text")
         with ui.tab_panels(tabs, value=form).classes("w-full grow") as panels:
@@ -155,10 +184,18 @@ class Window:
             self._notify(str(error), "negative")
             self._list_files()
             return
-        self._begin(f"{name}: changes that were not saved are back" if unsaved else "")
+        if unsaved:
+            self._begin(f"{name}: changes that were not saved are back")
+        elif not self.session.path.is_file() and self.session.changed_elsewhere:
+            self.session.take_changes()
+            self._begin(f"{name} is not saved yet: this window begins with the changes of the other one")
+        else:
+            self._begin("")
 
     def _begin(self, said: str) -> None:
         """Show another case from its beginning."""
+        self._stays = False
+        self._show_elsewhere()
         self._sliders.begin()
         self._answers.begin()
         self._list_files()
@@ -247,6 +284,7 @@ class Window:
     def _discard(self) -> None:
         """Go back to what is saved; undo brings the changes back."""
         self.session.discard()
+        self._show_elsewhere()
         self._text_changed()
 
     def _save(self) -> None:
@@ -258,11 +296,39 @@ class Window:
         self._show_state()
 
     def _keep(self) -> None:
-        """Write what is not saved beside the file, so that nothing is lost."""
+        """Write what is not saved beside the file, so that nothing is lost, and look what other windows do."""
         try:
             self.session.keep()
+            self._show_elsewhere()
         except (FemgearError, OSError) as error:
             self._state.text = f"not kept: {error}"
+
+    def _show_elsewhere(self) -> None:
+        """Say that another window has changed or saved the same file, and offer what it has."""
+        saved, changed = self.session.saved_elsewhere, self.session.changed_elsewhere
+        if not changed:
+            self._stays = False
+        self._elsewhere.visible = saved or (changed and not self._stays)
+        name = self.session.name
+        if saved:
+            text = f"{name} was saved or removed by another window or program since it was read here."
+            text += " Save it under another name, or take the saved file: it is not overwritten."
+        else:
+            text = f"{name} is open in another window, with changes that are not saved there."
+        self._elsewhere_text.text = text
+        self._take.visible, self._stay.visible, self._back.visible = changed, changed and not saved, saved
+        self._stay.text = "Keep what is here" if self.session.unsaved else "Stay with the saved file"
+
+    def _take_changes(self) -> None:
+        """Go on with what another window has not saved; undo brings back what was here."""
+        self.session.take_changes()
+        self._show_elsewhere()
+        self._text_changed()
+
+    def _stay_here(self) -> None:
+        """Go on with what is here; what the other window has stays there."""
+        self._stays = True
+        self._show_elsewhere()
 
     # what is said of it
 
@@ -353,7 +419,7 @@ class Window:
         """End what the window has begun."""
         self._answers.stop()
         try:
-            self.session.keep()
+            self.session.leave()
         finally:
             self._bench.stop()
             self._runs_panel.stop()

@@ -162,6 +162,7 @@ class Requests:
 
 def serve_bench(pipe: Connection, folder: Path, cache: Path | None) -> None:
     """Answer for a case in a folder: `Bench.look`, `tables`, `gears`, `draft`, `answer` and `sound`."""
-    bench = Bench(folder, cache=cache, waiting=pipe.poll)
+    requests = Requests(pipe)
+    bench = Bench(folder, cache=cache, waiting=pipe.poll, tell=requests.tell)
     names = "look", "tables", "gears", "draft", "answer", "sound"
-    Requests(pipe).answer({name: getattr(bench, name) for name in names})
+    requests.answer({name: getattr(bench, name) for name in names})

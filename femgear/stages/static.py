@@ -150,8 +150,10 @@ def solve_static(
     """
     gears, steps = planetary_set(case), steps or Steps()
     deviations = set_deviations(case) if deviations is None else deviations
+    progress("grids", 0.0, 1.0)
     sectors, bodies = known_compliances(case, gears, steps, cache=cache)
     width = over_width(case, gears, cache=cache, steps=steps)
+    progress("grids", 1.0, 1.0)
     sun_torque = case.torque_on_first_gear()
     periods, period_message = common_period(deviations, gears, limit=case.static.longest_record)
     options = CycleOptions(

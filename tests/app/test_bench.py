@@ -152,6 +152,18 @@ def test_a_newer_text_ends_an_answer(tmp_path):
         next(parts)
 
 
+def test_what_is_computed_is_told_with_the_title_of_its_stage(tmp_path):
+    told = []
+    bench = Bench(tmp_path, cache=CACHE, tell=told.append)
+    stages = [stage["name"] for stage in bench.look(TEXT, "pair.toml")["stages"]]
+    answered = [part["stage"] for part in bench.answer(TEXT, "pair.toml", (), stages)]
+    steps = list(dict.fromkeys(step["computing"] for step in told))
+    titles = {stage.name: stage.title for stage in train_of(parse_case(TEXT)).stages}
+    assert [step for step in steps if step in titles.values()] == [titles[name] for name in answered]
+    assert steps[:3] == [titles["static"], "grids", "contact"]
+    assert all(0.0 <= step["done"] <= step["total"] for step in told)
+
+
 def test_gears_are_drawn_in_space(answered):
     bench, _, _ = answered
     model = bench.gears(TEXT, "a.toml")

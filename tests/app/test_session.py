@@ -47,7 +47,7 @@ def test_what_was_changed_back_needs_no_file(session, tmp_path):
 def test_a_file_that_another_program_changed_is_not_replaced(session, tmp_path):
     session.change("title", "b")
     (tmp_path / "a.toml").write_text("other = 1\n")
-    with pytest.raises(StorageError, match="another program"):
+    with pytest.raises(StorageError, match="another window or program"):
         session.save()
     assert (tmp_path / "a.toml").read_text() == "other = 1\n"
     session.save_as("b.toml")
@@ -73,17 +73,95 @@ def test_what_was_begun_and_never_saved_is_saved_after_it_is_opened_again(tmp_pa
     assert (tmp_path / "new.toml").read_text() == "a = 1\n" and not (tmp_path / ".new.toml.draft").exists()
 
 
-def test_the_draft_of_another_window_stays(tmp_path):
+@pytest.fixture
+def windows(tmp_path):
+    """Two windows of one server with the same file."""
     (tmp_path / "a.toml").write_text("a = 1\n")
-    first, second = Session(tmp_path), Session(tmp_path)
-    for session, text in ((second, "a = 2\n"), (first, "a = 3\n")):
+    sessions = []
+    both = Session(tmp_path, sessions), Session(tmp_path, sessions)
+    for session in both:
         session.open("a.toml")
-        session.replace(text)
-    second.keep()
+    return both
+
+
+def test_windows_keep_their_own_changes_and_know_of_the_other(windows, tmp_path):
+    first, second = windows
+    assert not first.changed_elsewhere and not second.changed_elsewhere
+    first.replace("a = 3\n")
     first.keep()
+    assert second.changed_elsewhere and not first.changed_elsewhere and second.text == "a = 1\n"
+    second.replace("a = 2\n")
+    second.keep()
+    assert first.changed_elsewhere and first.text == "a = 3\n"
     second.save()
-    assert (tmp_path / ".a.toml.draft").read_text() == "a = 3\n"
-    assert Session(tmp_path).open("a.toml")
+    assert (tmp_path / "a.toml").read_text() == "a = 2\n" and first.saved_elsewhere and not second.saved_elsewhere
+    with pytest.raises(StorageError, match="another window"):
+        first.save()
+    assert (tmp_path / "a.toml").read_text() == "a = 2\n" and first.text == "a = 3\n"
+    first.discard()
+    assert first.text == "a = 2\n" and not first.saved_elsewhere and not second.changed_elsewhere
+    assert first.undo() and first.text == "a = 3\n"
+
+
+def test_changes_of_another_window_are_taken_and_come_back_with_undo(windows, tmp_path):
+    first, second = windows
+    first.replace("a = 3\n")
+    second.replace("a = 2\n")
+    second.take_changes()
+    assert second.text == "a = 3\n" and not second.changed_elsewhere
+    assert second.undo() and second.text == "a = 2\n" and second.changed_elsewhere
+    second.save_as("b.toml")
+    first.keep()
+    assert (tmp_path / "b.toml").read_text() == "a = 2\n" and not first.saved_elsewhere
+    assert sorted(path.name for path in tmp_path.glob(".*")) == [".a.toml.base", ".a.toml.draft"]
+
+
+def test_a_window_opened_later_has_the_saved_file_and_one_after_a_restart_all_changes(windows, tmp_path):
+    first, second = windows
+    for session, text in ((first, "a = 3\n"), (second, "a = 2\n")):
+        session.replace(text)
+        session.keep()
+    third = Session(tmp_path, first._sessions)
+    assert not third.open("a.toml") and third.text == "a = 1\n" and third.changed_elsewhere
+    third.leave()
+    again, texts = Session(tmp_path), set()  # of another server
+    assert again.open("a.toml") and case_files(tmp_path) == ["a.toml"]
+    texts.add(again.text)
+    assert again.changed_elsewhere
+    again.take_changes()
+    texts.add(again.text)
+    assert texts == {"a = 2\n", "a = 3\n"}
+    again.save()
+    assert not again.changed_elsewhere and not [*tmp_path.glob(".*")]
+
+
+def test_a_window_that_is_loaded_again_goes_on(windows):
+    first, second = windows
+    second.leave()
+    first.replace("a = 3\n")
+    first.leave()
+    loaded = Session(first.folder, first._sessions)
+    assert loaded.open("a.toml") and loaded.text == "a = 3\n" and not loaded.changed_elsewhere
+    # the former one comes back: both know, and neither writes over the other
+    first.come_back()
+    first.replace("a = 4\n")
+    loaded.replace("a = 5\n")
+    first.keep()
+    loaded.keep()
+    assert first.changed_elsewhere and loaded.changed_elsewhere
+    kept = {path.read_text() for path in first.folder.glob(".*.draft")}
+    assert kept == {"a = 4\n", "a = 5\n"}
+
+
+def test_what_another_program_keeps_in_the_same_place_stays(session, tmp_path):
+    session.change("title", "b")
+    session.keep()
+    (tmp_path / ".a.toml.draft").write_text("of = 2\n")
+    session.change("title", "c")
+    session.keep()
+    assert (tmp_path / ".a.toml.draft").read_text() == "of = 2\n" and session.changed_elsewhere
+    session.save()
+    assert (tmp_path / ".a.toml.draft").read_text() == "of = 2\n"
 
 
 def test_a_save_of_another_window_is_not_overwritten_after_a_restart(tmp_path):
@@ -99,7 +177,7 @@ def test_a_save_of_another_window_is_not_overwritten_after_a_restart(tmp_path):
     again = Session(tmp_path)  # the server was killed and started again
     assert again.open("a.toml") and again.text == "a = 1\nb = 5\n"
     again.replace("a = 1\nb = 6\n")
-    with pytest.raises(StorageError, match="changed by another program"):
+    with pytest.raises(StorageError, match="another window or program"):
         again.save()
     assert (tmp_path / "a.toml").read_text() == "a = 2\n"
     again.discard()

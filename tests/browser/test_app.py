@@ -369,6 +369,75 @@ def test_windows_do_not_mix(window, serve, folder):
     assert field(second, "operation.torque").input_value() == "100 N m"
 
 
+def type_torque(tab, torque: str) -> None:
+    """Type a torque with the keyboard."""
+    field(tab, "operation.torque").click()
+    tab.keyboard.press("Control+A")
+    tab.keyboard.type(torque)
+
+
+def test_windows_of_one_file_know_of_each_other(window, serve, folder):
+    server = serve(folder)
+    first, second = window(server), window(server)
+    for tab in (first, second):
+        unfold(tab, "operation")
+    type_torque(first, "150 N m")
+    told = second.locator(".elsewhere")
+    told.get_by_text("open in another window, with changes that are not saved").wait_for()
+    assert field(second, "operation.torque").input_value() == "100 N m", "nothing is taken over without a word"
+    press(second, "Take these changes")
+    told.wait_for(state="hidden")
+    assert field(second, "operation.torque").input_value() == "150 N m"
+    type_torque(second, "120 N m")
+    first.locator(".elsewhere").wait_for()
+    press(first, "Keep what is here")
+    first.locator(".elsewhere").wait_for(state="hidden")
+    assert field(first, "operation.torque").input_value() == "150 N m"
+    assert saved(second, folder)["operation"]["torque"] == "120 N m"
+    first.get_by_text("was saved or removed by another window").wait_for()
+    press(first, "Save")
+    first.get_by_text("E-STORAGE").first.wait_for()
+    assert tomllib.loads((folder / "set.toml").read_text())["operation"]["torque"] == "120 N m"
+    press(first, "Take the saved file")
+    first.locator(".elsewhere").wait_for(state="hidden")
+    assert field(first, "operation.torque").input_value() == "120 N m"
+
+
+def test_a_third_window_begins_with_the_saved_file_and_says_so(window, serve, folder):
+    server = serve(folder)
+    first = window(server)
+    unfold(first, "operation")
+    type_torque(first, "150 N m")
+    first.get_by_text("not saved", exact=True).wait_for()
+    second = window(server)
+    told = second.locator(".elsewhere")
+    told.wait_for()
+    unfold(second, "operation")
+    assert field(second, "operation.torque").input_value() == "100 N m"
+    press(second, "Stay with the saved file")
+    told.wait_for(state="hidden")
+    # the page that is loaded again is the same window: it goes on with its changes
+    first.wait_for_timeout(1000)
+    first.reload()
+    first.get_by_text("changes that were not saved are back").wait_for()
+    unfold(first, "operation")
+    assert field(first, "operation.torque").input_value() == "150 N m"
+    assert first.locator(".elsewhere").is_hidden()
+
+
+def test_an_answer_names_what_is_computed_and_for_how_long(window, serve, folder):
+    tab = window(serve(folder))
+    state, states = answers(tab).locator("#state"), []
+    while not (states and states[-1].startswith("computed")):
+        text = state.inner_text()
+        if text and text not in states:
+            states.append(text)
+        tab.wait_for_timeout(20)
+    steps = [text for text in states if text.startswith("computing: ")]
+    assert any("contact" in text for text in steps) and any("modes" in text for text in steps), states
+    assert all(text.startswith(("reading", "comput")) for text in states), states
+
+
 def test_nothing_is_lost_with_the_server(window, serve, folder):
     server = serve(folder)
     tab = window(server)

@@ -11,22 +11,25 @@ live.make = (tag, name, text) => {
 };
 
 // everything that is shown belongs to a former text until its stage has answered again
-live.begin = () => {
+live.begin = ({ text, since }) => {
   document.querySelectorAll("#seen > figure").forEach((figure) => figure.classList.add("former"));
   live.at("cards").classList.add("former");
-  live.at("state").textContent = "computing";
-  const start = performance.now();
+  live.drafted = "";
+  live.at("state").textContent = text || "computing";
+  const start = performance.now() - 1000 * (since || 0);
   clearInterval(live.clock);
   live.clock = setInterval(() => {
     live.at("elapsed").textContent = `${Math.round((performance.now() - start) / 1000)} s so far`;
   }, 1000);
 };
+live.step = ({ text }) => { live.at("state").textContent = live.drafted ? `${live.drafted}; ${text}` : text; };
 live.draft = ({ positions }) => {
-  live.at("state").textContent = `draft while a slider moves: ${positions} positions, peaks between them are cut off`;
+  live.at("state").textContent = live.drafted = `draft while a slider moves: ${positions} positions, peaks between them are cut off`;
 };
 live.end = ({ seconds, text }) => {
   clearInterval(live.clock);
   live.at("elapsed").textContent = "";
+  live.drafted = "";
   live.at("state").textContent = text || `computed in ${seconds.toFixed(2)} s`;
   if (!text) live.at("cards").classList.remove("former");
 };
@@ -138,7 +141,7 @@ page.parts.push(() => {
   addEventListener("message", (event) => {
     if (event.source !== parent || event.origin !== location.origin) return;
     const { what, ...given } = event.data;
-    if (["begin", "draft", "end", "judge", "draw", "fresh", "keep", "space", "tables", "clear"].includes(what)) live[what](given);
+    if (["begin", "step", "draft", "end", "judge", "draw", "fresh", "keep", "space", "tables", "clear"].includes(what)) live[what](given);
   });
   parent.postMessage({ femgear: "ready" }, location.origin);
 });
