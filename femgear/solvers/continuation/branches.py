@@ -311,11 +311,14 @@ class ContinuationProblem:
             orders=balance.orders,
             samples=self.samples,
             reduction=balance.reduction if _same_linear_part(problem, balance.problem) else None,
+            like=balance,
         )
 
     def evaluate(self, y, parameter: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Compute the residual (n_y,) [m], its derivatives by unknowns (n_y, n_y) and parameter (n_y,)."""
-        residual, jacobian, slope = self.balance_at(parameter).evaluate(y, self.frequency_at(parameter))
+        balance = self.balance_at(parameter)
+        forces = balance.forces(balance.lines(y))
+        residual, jacobian, slope = balance.evaluate(y, self.frequency_at(parameter), forces)
         if self.family is None:
             return residual, jacobian, slope[:, self.base]
         step = _DIFFERENCE * (self.limits[1] - self.limits[0])
@@ -326,14 +329,19 @@ class ContinuationProblem:
         elif parameter + offset[1] > self.limits[1]:
             offset = np.array([-1.0, -2.0]) * step
         a, b = offset
-        near, far = (self._residual(y, parameter + value) - residual for value in offset)
+        here = balance, forces[0]
+        near, far = (self._residual(y, parameter + value, *here) - residual for value in offset)
         return residual, jacobian, (near * b / a - far * a / b) / (b - a)
 
-    def _residual(self, y, parameter: float) -> np.ndarray:
+    def _residual(self, y, parameter: float, beside: HarmonicBalance, force: np.ndarray) -> np.ndarray:
+        """Residual (n_y,) [m] at a parameter; elements that those beside it share have the same force there."""
         balance = self.balance_at(parameter)
         lines = balance.lines(y)
         value = balance.receptance_at(self.frequency_at(parameter))
-        return balance.unknowns(balance.residual(lines, balance.forces(lines)[0], value))
+        same = np.array_equal(balance.reduction.reference, beside.reduction.reference)
+        if not same or balance.elements is not beside.elements:
+            force = balance.forces(lines)[0]
+        return balance.unknowns(balance.residual(lines, force, value))
 
     def first(self, parameter: float, start) -> PeriodicSolution:
         """Solve for the start of the curve, near a given solution or lines (n_columns, L) [m]."""

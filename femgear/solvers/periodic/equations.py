@@ -19,6 +19,7 @@ deflection grows without end, and so does everything that is measured by it (`_u
 
 from __future__ import annotations
 
+import operator
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
@@ -184,13 +185,16 @@ class HarmonicBalance:
         out[np.diag_indices(n * width)] += 1.0
         return out
 
-    def evaluate(self, y, frequency) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    def evaluate(
+        self, y, frequency, forces: tuple[np.ndarray, np.ndarray] | None = None
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Compute the residual (n_y,) [m] at unknowns y (n_y,) [m] and base frequencies (n_bases,) [rad/s].
 
-        With its derivatives (n_y, n_y) by y and (n_y, n_bases) by the base frequencies.
+        With its derivatives (n_y, n_y) by y and (n_y, n_bases) by the base frequencies; ``forces`` are those of
+        `forces` at y, where they are known.
         """
         lines = self.lines(y)
-        force, products = self.forces(lines)
+        force, products = self.forces(lines) if forces is None else forces
         value, change = self.receptance(frequency)
         moved = self._respond(change, force)
         slope = np.stack([self.unknowns(moved * order) for order in self.orders.T], axis=1)
@@ -277,6 +281,7 @@ def harmonic_balance(
     samples=None,
     reduction: Reduction | DirectReduction | None = None,
     frequencies: int | None = None,
+    like: HarmonicBalance | None = None,
 ) -> HarmonicBalance:
     """Make the harmonic equations of a problem.
 
@@ -295,6 +300,8 @@ def harmonic_balance(
         Of the same problem, from `reduce_problem`; made here when not given.
     frequencies : int, optional
         At how many base frequencies the equations are asked for where these are few, which saves modes.
+    like : HarmonicBalance, optional
+        Equations whose grid is taken where the problem has the very same elements, lines and samples.
     """
     if (harmonics is None) == (orders is None):
         words = "give the number of harmonics or the lines"
@@ -322,13 +329,22 @@ def harmonic_balance(
     if reduction.static.shape != (columns, columns + loads) or columns != problem.system.W.shape[1]:
         raise CaseError("the reduction belongs to another problem", code="E-SHAPE", key="reduction")
     source = source_columns(problem, orders)
-    grid = phase_grid(orders, samples or sample_counts(problem, orders))
-    elements = tuple(on_grid(element, grid.theta) for element in problem.elements)
-    longest = _longest(problem)
+    counts = samples or sample_counts(problem, orders)
+    if like is not None and _same_elements(problem, orders, like) and like.grid.samples == counts:
+        grid, elements, pairs, longest = like.grid, like.elements, like.pairs, like.longest
+    else:
+        grid = phase_grid(orders, counts)
+        elements = tuple(on_grid(element, grid.theta) for element in problem.elements)
+        pairs, longest = coupled_pairs(elements), _longest(problem)
     static = float(np.abs(reduction.static[:, columns:] @ source).max(initial=0.0))
     scale = static or longest or 1.0
-    pairs = coupled_pairs(elements)
     return HarmonicBalance(problem, orders, reduction, grid, elements, pairs, source, scale, longest)
+
+
+def _same_elements(problem: NonlinearSystem, orders: np.ndarray, like: HarmonicBalance) -> bool:
+    """Whether a problem has the elements of equations, object by object, and the same lines (L, n_bases)."""
+    mine, other = problem.elements, like.problem.elements
+    return len(mine) == len(other) and all(map(operator.is_, mine, other)) and np.array_equal(orders, like.orders)
 
 
 def reduced(problem: NonlinearSystem, lines: int | None = None) -> Reduction | DirectReduction:

@@ -26,6 +26,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
@@ -111,10 +112,15 @@ class ImpactPair:
             load=self.load * along,
             dofs=("y 1", "y 2", "x") if self.bearings else ("x",),
         )
-        return NonlinearSystem(system, (self.mesh(),), tuple(self._forces(ratio, along)))
+        return NonlinearSystem(system, (self._mesh,), tuple(self._forces(ratio, along)))
 
     def mesh(self) -> GearMeshes:
         """Make the mesh with its play on the one column, see `ImpactPair.problem`."""
+        return self._mesh
+
+    @cached_property
+    def _mesh(self) -> GearMeshes:
+        """One for the problems of all ratios, whose solvers evaluate its coefficients once."""
         k = FourierSeries(np.array([[1.0, *self.stiffness]]), orders_of(0, len(self.frequency)))
         return GearMeshes(np.array([0]), k, deflection=constant([DRIVE]), backlash=DRIVE - BACK)
 
