@@ -36,9 +36,24 @@ if pytest.approx(1e-20) == 2e-20:
 TESTS = Path(__file__).parent
 
 
+def _draw_from_no_source():
+    """Let tests draw numbers from the ranges that they name, and read no source for the numbers in it.
+
+    Hypothesis parses all modules of the package and of the tests, for which each worker needs five seconds in a new
+    clone. `make validate` draws from them too.
+    """
+    from hypothesis.internal.conjecture import providers
+
+    if not callable(getattr(providers, "is_local_module_file", None)):
+        raise pytest.UsageError("this Hypothesis looks for numbers of modules elsewhere: see tests/conftest.py")
+    providers.is_local_module_file = lambda path: False
+
+
 @pytest.hookimpl(tryfirst=True)
-def pytest_collection_modifyitems(items):
+def pytest_collection_modifyitems(items, config):
     """Mark tests slow whose lines quicker ones run too, by the list of validation/tools/slow_tests.py."""
+    if "hypothesis" in sys.modules and config.option.markexpr.startswith("not slow"):
+        _draw_from_no_source()
     listed = set((TESTS / "slow_tests.txt").read_text(encoding="utf-8").split("\n"))
     for item in items:
         if item.nodeid in listed and not item.get_closest_marker("decisive"):
@@ -77,6 +92,9 @@ def pytest_sessionfinish(session):
     if "PYTEST_XDIST_WORKER" not in os.environ:
         base = session.config._tmp_path_factory.getbasetemp()
         shutil.rmtree(base / "computed_once", ignore_errors=True)
+    # pytest collects five times more, for what finalizers say: the first one has all of it
+    gc.collect()
+    gc.freeze()
 
 
 @pytest.fixture(scope="session", autouse=True)

@@ -14,9 +14,18 @@ def tree(path: Path) -> ast.Module:
     return ast.parse(path.read_text(encoding="utf-8"))
 
 
+def statements(block: ast.AST) -> Iterator[ast.stmt]:
+    """All statements within a module or another one, the expressions aside."""
+    for name in ("body", "orelse", "finalbody", "handlers", "cases"):
+        for statement in getattr(block, name, ()):
+            yield statement
+            yield from statements(statement)
+
+
+@cache
 def dataclasses(path: Path) -> list[ast.ClassDef]:
     """All dataclasses of a module, public and private, wherever they stand."""
-    classes = [node for node in ast.walk(tree(path)) if isinstance(node, ast.ClassDef)]
+    classes = [node for node in statements(tree(path)) if isinstance(node, ast.ClassDef)]
     return [node for node in classes if any("dataclass" in ast.unparse(one) for one in node.decorator_list)]
 
 
