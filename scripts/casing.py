@@ -11,6 +11,7 @@ from typing import Annotated
 import numpy as np
 from cyclopts import Parameter
 from scipy.linalg import eigh
+from scipy.sparse import coo_array
 from scipy.sparse.linalg import LinearOperator, eigsh, splu
 from script_tools import Progress, meshed, print_table, ready_folder, run_script, say_files
 
@@ -157,12 +158,13 @@ def parts_of_surface(casing: Casing, basis) -> tuple[np.ndarray, np.ndarray]:
     middle = mesh.p[:, mesh.facets[:, outside]].mean(axis=1)
     keys = np.vstack([np.rint(2 * normal), np.floor(middle / PART)]).astype(int)
     part = np.unique(keys, axis=1, return_inverse=True)[1].ravel()
-    columns, area = np.zeros((basis.N, part.max() + 1)), np.zeros(part.max() + 1)
-    for i in range(len(area)):
-        surface = FacetBasis(mesh, basis.elem, facets=outside[part == i], intorder=2)
-        area[i] = surface.dx.sum()
-        columns[:, i] = LinearForm(lambda v, w: dot(v, w.n)).assemble(surface) / area[i]
-    return columns, area
+    surface = FacetBasis(mesh, basis.elem, facets=outside, intorder=2)
+    area = np.bincount(part, surface.dx.sum(axis=1))
+    flow = LinearForm(lambda v, w: dot(v, w.n)).elemental(surface)
+    # of every shape function of an element the facets follow one another
+    parts = np.tile(part, len(flow.data) // len(part))
+    columns = coo_array((flow.data, (flow.indices[0], parts)), shape=(basis.N, len(area)))
+    return columns.toarray() / area, area
 
 
 def condensed(K, M, watched, carried, modes: int):

@@ -112,7 +112,10 @@ def test_programs_that_read_results(tmp_path):
     entries = {
         "operation.speeds": ["250 rpm"],
         "runup.count": 0,
+        "static.positions": 8,
+        "static.flank_elements": 6,
         "static.stresses": False,
+        "dynamics.mesh_harmonics": 3,
         "housing.published": [],
     }
     case = with_values(read_case(ROOT / "cases" / "planetary_27_40_108.toml"), entries)

@@ -504,16 +504,15 @@ def test_complex_arrays_without_imaginary_part_and_areas_in_mm(folder, tmp_path)
 
 def test_parts_of_the_surface(folder):
     """The outer surface is closed but for the bore and the lower faces of the feet (divergence theorem)."""
-    small = Casing(size=0.02, points=16, modes=4)
-    basis = assembled(small)[0]
-    across, area = parts_of_surface(small, basis)
+    basis = assembled(TINY)[0]
+    across, area = parts_of_surface(TINY, basis)
     flows = []
     for axis in range(3):
         moved = np.zeros(basis.N)
         moved[basis.get_dofs(elements=True).all(f"u^{axis + 1}")] = 1.0
         assert np.abs(across.T @ moved).max() <= 1.0 + 1e-9
         flows.append(area @ (across.T @ moved))
-    np.testing.assert_allclose(flows, [0.0, 2 * small.foot * small.width, 0.0], atol=1e-12)
+    np.testing.assert_allclose(flows, [0.0, 2 * TINY.foot * TINY.width, 0.0], atol=1e-12)
     with np.load(folder / "surface.npz") as stored:
         area, shape = stored["sensor_area"], stored["sensor_shape"]
     assert (area[:2] == 0).all() and (area[2:] > 0).all() and shape.shape[1] == len(area)

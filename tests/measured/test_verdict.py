@@ -13,6 +13,8 @@ from femgear.measured.requests import Recording
 from femgear.measured.verdict import draw_side_bands, measured_verdict
 from validation.recordings import FAULTS, come_back, computed_lines, read_back
 
+pytestmark = pytest.mark.usefixtures("pictures_undrawn")
+
 NORMAL, UNEQUAL = VERDICTS[:2]
 
 

@@ -42,7 +42,7 @@ RUNS = {
     ),
     "planar": (
         "nrel_pgb",
-        {"planar.branch": {"from": "36 Hz", "to": "36.2 Hz", "harmonics": 2}},
+        {"planar.branch": {"from": "36 Hz", "to": "36.2 Hz", "harmonics": 2, "points": 10}},
     ),
     "helical": (
         "helical_30_20_70",

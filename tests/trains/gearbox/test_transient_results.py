@@ -13,7 +13,7 @@ from femgear.trains.gearbox.stages import GEARBOX, solve_deflections
 from femgear.trains.gearbox.transient_results import chosen_meshes, describe_transient, symbols
 from femgear.trains.reading import open_results, read_case, with_values
 
-pytestmark = pytest.mark.usefixtures("coarse_states")
+pytestmark = pytest.mark.usefixtures("coarse_states", "pictures_undrawn")
 
 CASES = Path(__file__).parents[3] / "cases"
 SHORT = {"transient.settle": "0.05 s", "transient.duration": "0.2 s", "transient.rate": "20 kHz"}
