@@ -21,6 +21,8 @@ from femgear.case.text import described, found, shown
 from femgear.errors import CaseError
 
 _NUMBER = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)(.*)", re.DOTALL)
+# Without these a text has none of the mistakes of `_check_number`.
+_NO_NUMBER = re.compile(r"\d,\d|[−–]|\d\s\d")
 # A product of named units with one- or two-digit exponents: pint would also evaluate "mm**9**9**9".
 _FACTOR = r"[A-Za-zµμ°]+(?:(?:\^|\*\*)[ ]?-?\d{1,2}|[²³])?"
 _UNIT = re.compile(rf"(?:1[ ]?/[ ]?)?{_FACTOR}(?:(?:[ ]?[*/·⋅.][ ]?|[ ]){_FACTOR}){{0,7}}")
@@ -182,6 +184,8 @@ def to_si(
 
 def _check_number(text: str, name: str) -> None:
     """Refuse what stands in no number: a decimal comma, a typographic minus, blanks between digits."""
+    if not _NO_NUMBER.search(text):
+        return
     if re.match(r"\s*[+-]?\d+,\d", text):
         message = f"{name} has a comma in its number"
         raise CaseError(message, code="E-UNIT", value=text, remedy="use a decimal point")

@@ -243,18 +243,20 @@ class RackTip:
         part of the fillet outside the base circle and refined by bisection to the last bit.
         """
 
-        def excess(theta):
-            radius, angle = self.fillet_point(theta)
+        def excess(radius, angle):
             return angle - (base_half_angle - inv(pressure_angle_at(radius, base_radius)))
 
         theta = np.linspace(0.0, self.end_angle, 4001)
-        radius, _ = self.fillet_point(theta)
-        value = np.where(radius >= base_radius, excess(theta), -np.inf)
+        radius, angle = self.fillet_point(theta)
+        value = np.where(radius >= base_radius, excess(radius, angle), -np.inf)
         first = int(np.argmax(value >= 0.0))
         low, high = theta[max(first - 1, 0)], theta[first]
         for _ in range(100):
             middle = 0.5 * (low + high)
-            inside = float(self.fillet_point(middle)[0]) < base_radius or float(excess(middle)) < 0.0
+            radius, angle = self.fillet_point(middle)
+            inside = float(radius) < base_radius or float(excess(radius, angle)) < 0.0
+            if middle == (low if inside else high):
+                break
             low, high = (middle, high) if inside else (low, middle)
         return float(high)
 

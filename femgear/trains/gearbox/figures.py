@@ -22,6 +22,7 @@ from femgear.trains.gearbox.transient_figures import TRANSIENT_FIGURES
 
 if TYPE_CHECKING:
     import xarray as xr
+    from matplotlib.backend_bases import RendererBase
     from matplotlib.figure import Figure
     from matplotlib.text import Annotation
     from matplotlib.transforms import Bbox
@@ -84,6 +85,8 @@ def _part_names(figure: Figure) -> None:
     from matplotlib.text import Annotation
 
     figure.draw_without_rendering()
+    # one for all names: each of them would make its own
+    renderer = figure._get_renderer()  # type: ignore[attr-defined]
     for ax in figure.axes:
         notes = [text for text in ax.texts if isinstance(text, Annotation)]
         arrows = [text.arrow_patch.get_window_extent().padded(1.0) for text in notes if text.arrow_patch is not None]
@@ -91,7 +94,7 @@ def _part_names(figure: Figure) -> None:
         placed: list[Bbox] = []
         for text in sorted((text for text in notes if text.get_text()), key=lambda text: text.xy[0]):
             spots = [*_spots(text.xyann[1], text.get_verticalalignment())]
-            boxes = [_moved(text, spot) for spot in spots]
+            boxes = [_moved(text, spot, renderer) for spot in spots]
             clear = [i for i, box in enumerate(boxes) if not any(box.overlaps(other) for other in (*arrows, *placed))]
             inside = [
                 i
@@ -101,14 +104,14 @@ def _part_names(figure: Figure) -> None:
             free = [i for i in inside if not any(curve.intersects_bbox(boxes[i], filled=False) for curve in curves)]
             near = [i for i in free if i < _NEAR]
             chosen = next(iter((*near, *inside, *clear)), 0)
-            placed.append(_moved(text, spots[chosen]))
+            placed.append(_moved(text, spots[chosen], renderer))
 
 
-def _moved(text: Annotation, spot: tuple[tuple[float, float], str, str]) -> Bbox:
+def _moved(text: Annotation, spot: tuple[tuple[float, float], str, str], renderer: RendererBase) -> Bbox:
     """Move a name to an offset with alignments, and give its place in the picture."""
     text.xyann, ha, va = spot
     text.set(ha=ha, va=va)
-    return text.get_window_extent()
+    return text.get_window_extent(renderer)
 
 
 def _spots(behind: float, va: str) -> Iterator[tuple[tuple[float, float], str, str]]:
