@@ -625,10 +625,9 @@ FIGURES = STATIC | {
                 "modulation and not the passing of the planets, which the Hanning-window model has alone."
             ),
             "microphone_spectrum": (
-                "Lines of a microphone beside the ring ({}), and levels of both sensors around "
+                "Lines of a microphone beside the ring ({}), and levels at microphone and sensor around "
                 "mesh harmonics, each relative to its strongest line there: waves of many nodal diameters "
-                "hardly radiate at low frequency, so that the microphone hears other side bands. Of a casing "
-                "of a file all of its surface radiates as large plates do, an estimate from above."
+                "hardly radiate at low frequency, so that the microphone hears other side bands."
             ),
         },
         draw=_housing_figures,

@@ -796,6 +796,12 @@ def _safeties(
     notes += safety_notes(rating)
 
 
+def remarks_of_casing(results: Results, stem: str) -> Iterator[str]:
+    """Say how a casing of a file radiates, below the lines of a microphone."""
+    if stem.startswith("microphone_spectrum") and results.case.housing.structure is not None:
+        yield "All of the surface of the casing radiates as large plates do, an estimate from above."
+
+
 def rate_set(results: Results) -> Rating | None:
     """Rate the teeth of a run with the load factors that it has; None where the case asks for no safeties."""
     if not rating_wanted(results.case):

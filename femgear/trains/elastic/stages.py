@@ -155,6 +155,7 @@ from femgear.trains.elastic.results import (
     measured_lines,
     mesh_bands,
     order_cuts,
+    remarks_of_casing,
     ring_shapes,
     sensor_signals,
     sensor_spectra,
@@ -931,6 +932,7 @@ ELASTIC = Train(
     duty=set_duty,
     front=(("run_up_levels", 0), ("static_transmission_error", 0), ("load_sharing", 0)),
     figures=FiguresOf("femgear.trains.elastic.figures:FIGURES"),
+    remarks=remarks_of_casing,
     recorded=Recorded(
         sensor_signals, signal_extent, _FORMATS, lambda results: 2, sensor_spectra, ring_shapes, order_cuts
     ),

@@ -1,5 +1,6 @@
 """Tables of the results of an elastic set."""
 
+from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
@@ -15,7 +16,11 @@ from femgear.trains.elastic.results import (
     factors_of_speeds,
     known_factors,
     measured_lines,
+    remarks_of_casing,
 )
+from femgear.trains.reading import read_case
+
+CASES = Path(__file__).parents[3] / "cases"
 
 
 def test_the_table_of_the_housing_has_both_sensors():
@@ -67,3 +72,13 @@ def test_measured_lines_stand_beside_the_computed_ones_of_their_order():
     assert [row[-1] for row in block.rows] == ["+6.0", "-"] and block.rows[1][4] == "-"
     case.housing.measured = ()
     assert measured_lines(SimpleNamespace(case=case, housing=housing)) == ()
+
+
+def test_captions_name_a_casing_of_a_file_where_the_case_has_one_alone():
+    in_casing, on_foundation = (
+        SimpleNamespace(case=read_case(CASES / name)) for name in ("in_a_casing.toml", "planetary_27_40_108.toml")
+    )
+    (words,) = remarks_of_casing(in_casing, "microphone_spectrum_250_rpm")
+    assert "casing radiates" in words
+    assert not [*remarks_of_casing(in_casing, "order_spectrum_250_rpm")]
+    assert not [*remarks_of_casing(on_foundation, "microphone_spectrum_250_rpm")]
