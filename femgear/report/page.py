@@ -276,7 +276,8 @@ def _caption(gears: Sequence[Block], data) -> tuple[str, str] | None:
         return None
     kinds = {body["kind"] for body in data["space"]["bodies"]}
     words = [words for kind, words in _BODIES.items() if kind in kinds]
-    box = "; the pale box stands for the casing, whose shape the case does not have" * ("casing" in data["space"])
+    box = "; the pale box stands for the casing, whose shape the case does not have, and moves as its seats do"
+    box *= "casing" in data["space"]
     return f"{' and '.join(', '.join(words).rsplit(', ', 1)).capitalize()}{box}.", POINTER
 
 

@@ -126,6 +126,7 @@ def space(
     place: np.ndarray,
     motions: Sequence[Motion],
     casing: tuple[np.ndarray, np.ndarray] | None = None,
+    on_casing: Sequence[str] = (),
 ) -> dict[str, Any]:
     """Collect what the browser draws of a gearbox in space.
 
@@ -140,6 +141,8 @@ def space(
         Views to choose from.
     casing : ((3,) array, (3,) array), optional
         Opposite corners of the box that stands for a casing [m].
+    on_casing : sequence of str
+        Members whose stations are on the casing: the box moves as they do.
 
     Returns
     -------
@@ -162,8 +165,12 @@ def space(
             }
             for motion in motions
         ],
-        **({} if casing is None else {"casing": [_lengths(corner) for corner in casing]}),
+        **({} if casing is None else _moving_box(casing, on_casing)),
     }
+
+
+def _moving_box(corners: tuple[np.ndarray, np.ndarray], on_casing: Sequence[str]) -> dict[str, Any]:
+    return {"casing": [_lengths(corner) for corner in corners], "casing_members": [*dict.fromkeys(on_casing)]}
 
 
 def _lengths(values: Any) -> list[float]:

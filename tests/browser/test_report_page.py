@@ -194,6 +194,32 @@ def test_bodies_of_a_gearbox_move_as_their_stations_do(opened, report):
         assert field == pytest.approx(wanted.tolist(), rel=0.01, abs=2e-3 * largest), member
 
 
+def test_the_box_of_a_rigid_casing_moves_as_the_casing_does(opened, report):
+    """Every vertex of the box moves as translation and rotation of the casing's station, of modes.nc."""
+    modes = open_results(report(MANY_MESHES).parent)["modes"]
+    model = json.loads((report(MANY_MESHES).parent / "space.json").read_text())
+    assert model["casing_members"] == ["casing"]
+    at = modes["station"].values.tolist().index("casing")
+    numbers = [
+        int(motion["title"].split(":")[0].split()[1]) - 1 if motion["swings"] else -1 for motion in model["motions"]
+    ]
+    choice = max(range(len(numbers)), key=lambda i: np.abs(modes["motion"].values[at, :, numbers[i]]).max())
+    motion, place = modes["motion"].values[at, :, numbers[choice]], 1e3 * modes["place"].values[at]
+    moved = """(choice) => { const chooser = document.getElementById('solid-view');
+        chooser.value = String(choice); chooser.dispatchEvent(new Event('change'));
+        return document.getElementById('solid-place').space.box.map(({ rest, field }) =>
+            [Array.from(rest), Array.from(field)]); }"""
+    tab = opened(MANY_MESHES)
+    faces, edges = tab.evaluate(moved, choice + 1)
+    for rest, field in (faces, edges):
+        points, drawn = np.reshape(rest, (-1, 3)), np.reshape(field, (-1, 3))
+        wanted = 1e3 * motion[:3] + np.cross(motion[3:], points - place)
+        assert np.abs(wanted).max() > 0.0
+        assert drawn == pytest.approx(wanted, abs=0.01 * np.abs(wanted).max())
+    # at rest, and while it turns, it stands still
+    assert not np.any(tab.evaluate(moved, 0)[0][1])
+
+
 def test_shafts_bend_between_their_stations(opened, report):
     """Every vertex moves as the line through the two stations that are next to it along z, of modes.nc."""
     name = "own_chain"

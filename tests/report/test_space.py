@@ -46,7 +46,9 @@ def test_motions_are_those_of_the_stations_in_mm_and_rad():
     assert unpacked(motion["turned"]) == pytest.approx(values[:, 3:].ravel(), abs=1e-9)
     assert motion["swings"] and "casing" not in model
     corners = np.array([-0.1, 0.0, 0.2]), np.array([0.1, 0.2, 0.3])
-    assert space([body], ["a"], place[:1], [], corners)["casing"] == [[-100.0, 0.0, 200.0], [100.0, 200.0, 300.0]]
+    boxed = space([body], ["a", "seat", "seat"], place, [], corners, ["seat", "seat"])
+    assert boxed["casing"] == [[-100.0, 0.0, 200.0], [100.0, 200.0, 300.0]]
+    assert boxed["casing_members"] == ["seat"] and boxed["members"]["seat"]["rows"] == [2, 1]
 
 
 def test_marked_teeth_have_their_words():

@@ -92,31 +92,65 @@ page.space = () => {
   const bodies = model.bodies.map(bodyOf);
   bodies.forEach(({ tips, at }) => tips.forEach(({ text, vertex }) => page.tag(view, text, () => at.subarray(3 * vertex, 3 * vertex + 3))));
 
-  // a pale box with edges for a casing, which stands still
+  // a pale box with edges for a casing: near a station on it the box moves as that station does
+  const box = [];
   if (model.casing) {
-    const corners = [0, 1, 2, 3, 4, 5, 6, 7].map((k) => [0, 1, 2].map((axis) => model.casing[(k >> axis) & 1][axis] - middle[axis]));
-    const geometry = (order) => {
+    const parts = 8, corner = (place) => [0, 1, 2].map((k) => model.casing[0][k] + place[k] * (model.casing[1][k] - model.casing[0][k]));
+    const add = (points, index, material) => {
+      const rest = Float32Array.from(points.flat()), at = Float32Array.from(rest, (value, i) => value - middle[i % 3]);
       const shape = new THREE.BufferGeometry();
-      shape.setAttribute("position", new THREE.BufferAttribute(Float32Array.from(order.flatMap((k) => corners[k])), 3));
-      shape.computeVertexNormals();
-      return shape;
+      shape.setIndex(index);
+      shape.setAttribute("position", new THREE.BufferAttribute(at, 3));
+      group.add(new THREE.Mesh(shape, new THREE.MeshLambertMaterial({ color: 0x6c7680, side: 2, flatShading: true, ...material })));
+      box.push({ rest, at, shape, field: new Float32Array(rest.length) });
     };
-    const faces = [[0, 1, 3, 2], [4, 5, 7, 6], [0, 1, 5, 4], [2, 3, 7, 6], [0, 2, 6, 4], [1, 3, 7, 5]].flatMap(([a, b, c, d]) => [a, b, c, a, c, d]);
-    const look = { color: 0x6c7680, transparent: true, opacity: 0.13, depthWrite: false, side: 2 };
-    group.add(new THREE.Mesh(geometry(faces), new THREE.MeshLambertMaterial(look)));
-    // edges are thin bars: three.min.js of this page has no lines
-    const bar = 0.0025 * size;
-    const edges = [0, 1, 2].flatMap((axis) => [0, 1, 2, 3, 4, 5, 6, 7].filter((k) => !((k >> axis) & 1)).map((k) => [corners[k], corners[k + (1 << axis)], axis]));
-    edges.forEach(([from, to, axis]) => {
-      const others = [0, 1, 2].filter((one) => one !== axis), points = [];
-      const at = (end, i) => { const point = [...end], turn = (i * Math.PI) / 2; point[others[0]] += bar * Math.cos(turn); point[others[1]] += bar * Math.sin(turn); return point; };
-      for (let i = 0; i < 4; i++) points.push(at(from, i), at(to, i), at(from, i + 1), at(from, i + 1), at(to, i), at(to, i + 1));
-      const shape = new THREE.BufferGeometry();
-      shape.setAttribute("position", new THREE.BufferAttribute(Float32Array.from(points.flat()), 3));
-      shape.computeVertexNormals();
-      group.add(new THREE.Mesh(shape, new THREE.MeshLambertMaterial({ color: 0x6c7680, side: 2 })));
+    const points = [], index = [], bars = [], barIndex = [];
+    [0, 1, 2].forEach((axis) => {
+      const [one, other] = [0, 1, 2].filter((k) => k !== axis);
+      [0, 1].forEach((side) => {
+        const first = points.length;
+        for (let i = 0; i <= parts; i++) for (let j = 0; j <= parts; j++) {
+          const place = [0, 0, 0];
+          [place[axis], place[one], place[other]] = [side, i / parts, j / parts];
+          points.push(corner(place));
+          const a = first + i * (parts + 1) + j, b = a + parts + 1;
+          if (i < parts && j < parts) index.push(a, b, a + 1, a + 1, b, b + 1);
+        }
+      });
+      // edges are thin bars: three.min.js of this page has no lines
+      [[0, 0], [0, 1], [1, 0], [1, 1]].forEach((ends) => {
+        const first = bars.length, thick = 0.0025 * size;
+        for (let i = 0; i <= parts; i++) for (let k = 0; k < 4; k++) {
+          const place = [0, 0, 0];
+          [place[axis], place[one], place[other]] = [i / parts, ...ends];
+          const point = corner(place);
+          point[one] += thick * Math.cos((k * Math.PI) / 2);
+          point[other] += thick * Math.sin((k * Math.PI) / 2);
+          bars.push(point);
+          const a = first + 4 * i + k, b = first + 4 * i + ((k + 1) % 4);
+          if (i < parts) barIndex.push(a, a + 4, b, b, a + 4, b + 4);
+        }
+      });
     });
+    add(points, index, { transparent: true, opacity: 0.13, depthWrite: false });
+    add(bars, barIndex, {});
   }
+  const seats = (model.casing_members || []).flatMap((name) => members[name].rows.map((row, i) => ({ row, at: members[name].at.slice(3 * i, 3 * i + 3) })));
+  // D. Shepard, A two-dimensional interpolation function for irregularly-spaced data (1968): weights 1/distance^2
+  const boxField = ({ rest, field }, moved, turned) => {
+    field.fill(0);
+    for (let i = 0; i < rest.length && seats.length; i += 3) {
+      let whole = 0;
+      seats.forEach(({ row, at }) => {
+        const arm = [0, 1, 2].map((k) => rest[i + k] - at[k]), weight = 1 / (arm[0] ** 2 + arm[1] ** 2 + arm[2] ** 2 + 1e-9);
+        const [a, b, c] = [0, 1, 2].map((k) => turned[3 * row + k]);
+        const motion = [b * arm[2] - c * arm[1], c * arm[0] - a * arm[2], a * arm[1] - b * arm[0]];
+        motion.forEach((value, k) => { field[i + k] += weight * (moved[3 * row + k] + value); });
+        whole += weight;
+      });
+      [0, 1, 2].forEach((k) => { field[i + k] /= whole; });
+    }
+  };
 
   // motion of every vertex: of a member of several stations between the two that are next to it along z
   const fieldOf = (body, moved, turned) => {
@@ -157,11 +191,13 @@ page.space = () => {
     if (!motion) {
       state.fields = bodies.map((body) => new Float32Array(3 * body.points));
       state.factor = 0;
+      box.forEach(({ field }) => field.fill(0));
       bodies.forEach((body) => paint(body, () => (body.kind === "gear" ? GEARS[body.stage % GEARS.length] : COLOURS[body.kind])));
       bar.textContent = "";
     } else {
       const moved = page.unpack(motion.moved), turned = page.unpack(motion.turned);
       state.fields = bodies.map((body) => fieldOf(body, moved, turned));
+      box.forEach((part) => boxField(part, moved, turned));
       const values = state.fields.map(sizes), top = Math.max(1e-12, ...values.map((one) => one.reduce((a, b) => Math.max(a, b), 0)));
       bodies.forEach((body, k) => paint(body, (i) => page.tint(values[k][i] / top)));
       state.factor = (0.05 * size) / top;
@@ -196,6 +232,10 @@ page.space = () => {
       const field = state.fields[k];
       for (let i = 0; i < 3 * body.points; i++) body.at[i] = body.rest[i] - middle[i % 3] + factor * field[i];
       body.shape.attributes.position.needsUpdate = true;
+    });
+    box.forEach(({ rest, at, field, shape }) => {
+      for (let i = 0; i < rest.length; i++) at[i] = rest[i] - middle[i % 3] + factor * field[i];
+      shape.attributes.position.needsUpdate = true;
     });
     render();
   };
@@ -235,6 +275,6 @@ page.space = () => {
   });
   canvas.addEventListener("pointerleave", () => { tip.hidden = true; });
   choose();
-  place.space = { bodies, state, view };
+  place.space = { bodies, box, state, view };
 };
 page.parts.push(page.space);

@@ -61,7 +61,9 @@ def write_space(drawn: Drawn, folder: Path) -> list[str]:
     bodies = [*gearbox_bodies(drawn.case, dict(zip(stations, place, strict=True))), *_marks(deflection)]
     if not bodies:
         return []
-    model = space(bodies, carriers, place, motions, None if drawn.case.casing is None else _casing_box(bodies))
+    on_casing = [carrier for carrier, member in zip(carriers, members, strict=True) if member == CASING]
+    box = None if drawn.case.casing is None else _casing_box(bodies)
+    model = space(bodies, carriers, place, motions, box, on_casing)
     write_text(json.dumps(model, allow_nan=False, separators=(",", ":")), folder / SPACE)
     return [SPACE]
 

@@ -86,6 +86,8 @@ def test_motions_are_deflections_and_modes_of_the_run(tmp_path):
     assert swings == [False] * cases + [True] * min(elastic, 40)
     kinds = [body["kind"] for body in model["bodies"]]
     assert {"gear", "shaft", "sensor", "foot"} <= {*kinds}
+    at_casing = data["deflection"]["station"].values[data["deflection"]["member"].values == CASING].tolist()
+    assert model["casing_members"] == at_casing and model["casing_members"]
     movers = {body["member"] for body in model["bodies"]}
     assert movers <= model["members"].keys()
     assert write_space(Drawn(answer.case, {}), tmp_path) == []
