@@ -18,7 +18,7 @@ from femgear.case.sections import StrengthSection
 from femgear.findings import CATALOGUE, DOUBT, FAULT, NOTE, Finding, counted, in_words, percent
 from femgear.report.tables import Block, merged_names
 from femgear.stages.life_results import SYMBOLS, first_to_fail, hours_text
-from femgear.stages.strength import OF_ROOTS, RatedFlank, Rating, gear_words
+from femgear.stages.strength import OF_ROOTS, OF_TEETH, RatedFlank, Rating, gear_words
 
 State = Literal["good", "look", "bad", "open", "absent"]
 _WORDS: dict[State, str] = {
@@ -344,7 +344,7 @@ def judge_lives(
         sentence = f"It lives {_hours(shortest)}{wanted} ({words})"
     missing = f"the life of {_and(unrated)} is not known" if unrated else ""
     sentence += f"; {missing}" if missing else ""
-    reasons = _doubts(findings, OF_ROOTS)
+    reasons = _doubts(findings, OF_ROOTS if any(name == "teeth" for name, *_ in lives) else OF_TEETH)
     limit = "operation.required_hours gives a limit" if required is None else f"at least {required:,.0f} h"
     state: State = "look" if missing or reasons else "good"
     if required is None or shortest < required:

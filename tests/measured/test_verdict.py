@@ -1,6 +1,7 @@
 """femgear.measured.verdict: recordings that femgear makes itself come back, healthy and unequal sets are told apart."""
 
 import csv
+import warnings
 
 import numpy as np
 import pytest
@@ -11,6 +12,7 @@ from femgear.measured.heard_set import HeardSet
 from femgear.measured.lines import VERDICTS
 from femgear.measured.requests import Recording
 from femgear.measured.verdict import draw_side_bands, measured_verdict
+from femgear.report.style import png_bytes
 from validation.recordings import FAULTS, come_back, computed_lines, read_back
 
 pytestmark = pytest.mark.usefixtures("pictures_undrawn")
@@ -117,6 +119,20 @@ def test_every_line_states_by_how_much_it_may_be_wrong(tmp_path, capsys):
         for row in csv.DictReader(stream):
             order, stated = round(float(row["order"])), float(row["uncertainty [dB]"])
             assert abs(20 * np.log10(float(row["amplitude [m/s^2]"]) / abs(HEALTHY[order]))) < stated < 6.0
+
+
+@pytest.mark.parametrize("harmonics", [(1,), (1, 2, 3), (900, 1000, 1100)])
+def test_many_lines_of_every_verdict_fit_the_figure(harmonics):
+    """Matplotlib warns where axes collapse, which ends this test."""
+    heard = HeardSet(108, 27, 40, np.radians([0, 120, 240]))
+    lines = {
+        verdict: [(108.0 * h + 2.0 * i, -3.0 * i) for h in harmonics for i in range(-6, 7)] for verdict in VERDICTS
+    }
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        figure = draw_side_bands(heard, lines, threshold=-60.0, harmonics=harmonics, half_width=12)
+        png_bytes(figure)
+    assert min(ax.get_position().height * figure.get_figheight() for ax in figure.axes) > 1.0
 
 
 def test_lines_of_every_verdict_are_drawn_at_their_orders():

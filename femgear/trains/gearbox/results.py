@@ -15,6 +15,7 @@ from femgear.case.gear_set import planetary_set
 from femgear.case.load_spectrum import running_shares
 from femgear.case.messages import estimated_materials
 from femgear.case.quantities import LENGTH, RPM
+from femgear.case.teeth import case_overlap
 from femgear.errors import GeometryError
 from femgear.findings import DOUBT, FAULT, Finding, percent
 from femgear.gears.checks import check_meshes
@@ -677,7 +678,9 @@ def _of_teeth(case: GearboxCase) -> Iterator[Finding]:
         for i, stage in enumerate(getattr(case, kind)):
             if (teeth := teeth_of(stage)) is None:
                 continue
-            rims = [finding for finding in check_meshes(planetary_set(teeth)) if finding.code == "W-RIM"]
+            gears = planetary_set(teeth)
+            meshes = check_meshes(gears, overlap=case_overlap(teeth, gears))
+            rims = [finding for finding in meshes if finding.code in ("W-RIM", "W-CONTACT-RATIO")]
             for finding in (*estimated_materials(teeth), *with_rim_doubts(rims, teeth), *left_out_of_faults(teeth)):
                 alike = finding.code, finding.key, finding.text
                 first.setdefault(alike, replace(finding, key=f"{kind}[{i}].teeth.{finding.key}"))

@@ -9,7 +9,9 @@ from casings import casing_tables
 from gearbox_equivalents import elastic_set_tables
 from small_gearbox import pair_tables, planetary_tables
 
+from femgear.case.gear_set import planetary_set
 from femgear.findings import Finding
+from femgear.trains.gearbox.case_file import teeth_of
 from femgear.trains.gearbox.results import (
     deflection_warnings,
     describe_deflection,
@@ -17,7 +19,7 @@ from femgear.trains.gearbox.results import (
     gearbox_warnings,
 )
 from femgear.trains.gearbox.stages import solve_box_modes, solve_deflections
-from femgear.trains.reading import read_case
+from femgear.trains.reading import read_case, with_values
 
 pytestmark = pytest.mark.usefixtures("coarse_states")
 
@@ -82,6 +84,16 @@ def test_thin_rims_of_teeth_are_told():
     tables["pair"][0]["teeth"]["gear_1"]["bore_radius"] = "30 mm"
     (finding,) = gearbox_warnings(read_case(tables))
     assert (finding.code, finding.key) == ("W-RIM", "pair[0].teeth.gear_1.bore_radius")
+
+
+def test_an_overlap_that_alone_keeps_teeth_in_contact_is_a_doubt_and_no_refusal():
+    """A transverse contact ratio below one of helical teeth, whose overlap ratio makes the whole larger than one."""
+    tips = {"pair[0].teeth.gear_1.tip_diameter": "41.3 mm", "pair[0].teeth.gear_2.tip_diameter": "116.3 mm"}
+    short = with_values(read_case("cases/e_axle.toml"), tips)
+    gears = planetary_set(teeth_of(short.pair[0]))
+    assert gears.kinds[0].contact_ratio < 1.0
+    (finding,) = [finding for finding in gearbox_warnings(short) if finding.code == "W-CONTACT-RATIO"]
+    assert (finding.severity, finding.key) == ("doubt", "pair[0].teeth.set.centre_distance")
 
 
 def test_modes_and_their_parts_are_in_the_file():
