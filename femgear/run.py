@@ -578,17 +578,18 @@ def export_results(
         progress("mat", 1, 1)
     if recorded is not None and {"wav", "uff", "quality"} & {*formats}:
         how = _scaled(how, recorded.extent(results, how.rate))
-    if recorded is not None and recorded.shapes and "uff" in formats:
-        progress("uff", 0, 1)
-        signals = (signal for signal in recorded.signals(results, how) if signal.steady)
-        write_functions(signals, recorded.spectra(results), folder / "signals.uff")
-        write_modes(recorded.shapes(results), folder / "modes.uff")
-        files += ["signals.uff", "modes.uff"]
-        progress("uff", 1, 1)
-    if recorded is not None and not {"wav", "quality"}.isdisjoint(formats):
         steps = recorded.each(results) * (results[needs["wav"][0]].sizes["speed"] + ("runup" in results.stages))
-        signals = _told(recorded.signals(results, how), progress, steps)
-        files += _export_sound(signals, folder, formats, how)
+        sound = _SoundFiles(folder, formats, how)
+        # every signal is sampled once, whatever it is written as
+        signals = sound.written(_told(recorded.signals(results, how), progress, steps))
+        if recorded.shapes and "uff" in formats:
+            steady = (signal for signal in signals if signal.steady)
+            write_functions(steady, recorded.spectra(results), folder / "signals.uff")
+            write_modes(recorded.shapes(results), folder / "modes.uff")
+            files += ["signals.uff", "modes.uff"]
+        for _ in signals:
+            pass
+        files += sound.end()
     return files
 
 
@@ -658,31 +659,54 @@ def _scaled(sampling: Sampling, extent: Mapping[str, tuple[float, float, float]]
     return sampling
 
 
-def _export_sound(signals: Iterable[Signal], folder: Path, formats: Collection[str], sampling: Sampling) -> list[str]:
-    """Write signals as WAV files, what is heard of those of microphones as a table; returns their names."""
-    files, rows, peaks = list[str](), list[list](), dict[str, float]()
-    scales = {unit: getattr(sampling, name) or 1.0 for unit, name in SCALES.items()}
-    for signal in signals:
-        if "wav" in formats:
-            peaks[signal.unit] = max(peaks.get(signal.unit, 0.0), float(np.abs(signal.values).max()))
-            files.append(checked_name(f"{signal.name}.wav"))
-            write_wav(signal, folder / files[-1], full_scale=scales[signal.unit])
-        if "quality" in formats and signal.unit == "Pa" and signal.steady:
-            quality = sound_quality(signal.values, signal.rate)
-            tones = " ".join(f"{tone:g}" for tone in quality.tones)
-            rows.append([signal.name, quality.loudness, quality.tone_to_noise, quality.prominence, tones])
-    for unit in [unit for unit, peak in peaks.items() if peak > scales[unit]]:
-        text = f"samples reach {peaks[unit]:.4g} {unit}, the full scale is {scales[unit]:g}: most players clip"
-        remedy = f"raise --{SCALES[unit].replace('_', '-')} to hear it"
-        tell(Finding("W-CLIPPING", "", text, remedy=remedy), stacklevel=4)
-    if rows:
-        header = (
-            "signal",
-            "loudness [sone]",
-            "tone-to-noise ratio [dB]",
-            "prominence ratio [dB]",
-            "tones [Hz]",
-        )
-        write_csv(folder / "sound_quality.csv", header, rows)
-        files.append("sound_quality.csv")
-    return files
+class _SoundFiles:
+    """WAV files of signals, and what is heard of those of microphones as a table.
+
+    Parameters
+    ----------
+    folder : path
+    formats : collection of str
+        "wav" and "quality" are those that it writes.
+    sampling : Sampling
+        With full scales of the WAV files.
+    """
+
+    def __init__(self, folder: Path, formats: Collection[str], sampling: Sampling) -> None:
+        self._folder, self._formats = folder, formats
+        self._scales = {unit: getattr(sampling, name) or 1.0 for unit, name in SCALES.items()}
+        self._files, self._rows, self._peaks = list[str](), list[list](), dict[str, float]()
+
+    def written(self, signals: Iterable[Signal]) -> Iterator[Signal]:
+        """Give signals on, each as soon as it is written."""
+        for signal in signals:
+            if "wav" in self._formats:
+                self._peaks[signal.unit] = max(self._peaks.get(signal.unit, 0.0), float(np.abs(signal.values).max()))
+                self._files.append(checked_name(f"{signal.name}.wav"))
+                write_wav(signal, self._folder / self._files[-1], full_scale=self._scales[signal.unit])
+            if "quality" in self._formats and signal.unit == "Pa" and signal.steady:
+                quality = sound_quality(signal.values, signal.rate)
+                tones = " ".join(f"{tone:g}" for tone in quality.tones)
+                self._rows.append([signal.name, quality.loudness, quality.tone_to_noise, quality.prominence, tones])
+            yield signal
+
+    def end(self) -> list[str]:
+        """Write the table and warn of samples beyond the full scale; returns the names of all files."""
+        for unit in [unit for unit, peak in self._peaks.items() if peak > self._scales[unit]]:
+            text = (
+                f"samples reach {self._peaks[unit]:.4g} {unit}, the full scale is {self._scales[unit]:g}: "
+                "most players clip"
+            )
+            remedy = f"raise --{SCALES[unit].replace('_', '-')} to hear it"
+            tell(Finding("W-CLIPPING", "", text, remedy=remedy), stacklevel=4)
+        if self._rows:
+            header = (
+                "signal",
+                "loudness [sone]",
+                "tone-to-noise ratio [dB]",
+                "prominence ratio [dB]",
+                "tones [Hz]",
+            )
+            write_csv(self._folder / "sound_quality.csv", header, self._rows)
+            self._files.append("sound_quality.csv")
+        return self._files
+

@@ -7,12 +7,14 @@ which the file states; nothing is normalised.
 from __future__ import annotations
 
 import io
+import shutil
 import struct
+import tempfile
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from html import escape
-from itertools import count, islice
+from itertools import chain, count, islice
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 from zipfile import ZIP_DEFLATED, ZipFile
@@ -145,7 +147,7 @@ def write_functions(signals: Iterable[Signal], spectra: Iterable[Spectrum], path
     unused = {f"{name}_spec_data_type": 0 for name in ("orddenom", "z_axis")} | {"z_axis_value": 0.0}
     scalar = {"rsp_dir": 0, "ref_node": 0, "ref_dir": 0, "binary": 0, "abscissa_spacing": 1, **unused}
     with _universal_file(path) as write:
-        for number, signal in enumerate([*signals, *spectra], 1):
+        for number, signal in enumerate(chain[Signal | Spectrum](signals, spectra), 1):
             uneven = signal.frequency if isinstance(signal, Spectrum) else None
             if isinstance(signal, Signal):
                 step, words = 1 / signal.rate, f"samples a second [Hz]: {signal.rate!r}"
@@ -185,14 +187,18 @@ def _universal_file(path: Path) -> Iterator[Any]:
     """Give a function ``(dataset, **fields)`` that appends to a new universal file in SI units."""
     with nvh_library("universal files"):
         import pyuff
-    with replaced_file(path) as temporary:
-        file = pyuff.UFF(str(temporary))
+    with replaced_file(path) as temporary, tempfile.TemporaryDirectory() as place:
+        # after every data set the library reads its file again: one of that set alone
+        of_one_set = Path(place) / "set.uff"
+        file = pyuff.UFF(str(of_one_set))
 
         def write(kind: int, **values: object) -> None:
             try:
-                file.write_sets(getattr(pyuff, f"prepare_{kind}")(**values), mode="add")
+                file.write_sets(getattr(pyuff, f"prepare_{kind}")(**values), mode="overwrite")
             except Exception as error:  # the library hides what happened: a full disk, an interrupt
                 raise error.__context__ or error from None
+            with open(of_one_set, "rb") as written, open(temporary, "ab") as whole:
+                shutil.copyfileobj(written, whole)
 
         scales = {"length": 1.0, "force": 1.0, "temp": 1.0, "temp_offset": 273.15}
         write(164, units_code=1, units_description="SI", temp_mode=1, **scales)

@@ -26,7 +26,7 @@ from femgear.exchange.formats import (
     write_workbook,
 )
 from femgear.exchange.sampling import Sampling
-from femgear.housing.sound import run_up_signal, stored_sound
+from femgear.housing.sound import run_up_signal, sampled_signal, stored_sound
 from femgear.storage.files import own_files
 from femgear.storage.results import dataset, tables_of
 from femgear.trains.elastic.results import run_up_lines, sensor_signals
@@ -140,6 +140,42 @@ def test_progress_counts_the_signals(results, tmp_path):
     options = Sampling(duration=0.1, run_up=0.1)
     names = run.export_results(results, tmp_path / "a", ["wav"], options, progress=lambda *one: told.append(one))
     assert told == [("sound", done, len(names)) for done in range(len(names) + 1)]
+
+
+def test_signals_of_several_formats_are_sampled_once_and_are_those_of_each(results, tmp_path, monkeypatch):
+    options, times = Sampling(duration=0.1, run_up=0.1), []
+
+    def counted(*given, **named):
+        times.append(given[2])
+        return sampled_signal(*given, **named)
+
+    monkeypatch.setattr("femgear.trains.elastic.results.sampled_signal", counted)
+    together, apart = tmp_path / "together", tmp_path / "apart"
+    own_files(together, ())
+    own_files(apart, ())
+    names = run.export_results(results, together, ["wav", "uff"], options)
+    steady = sum(name.endswith("_rpm.wav") for name in names)
+    assert len(times) == steady > 0
+    for form in ("wav", "uff"):
+        run.export_results(results, apart, [form], options)
+    assert len(times) == 3 * steady
+    assert all((together / name).read_bytes() == (apart / name).read_bytes() for name in names)
+
+
+def test_a_universal_file_is_written_without_reading_it_again(tmp_path, monkeypatch):
+    """The library looks for the data sets of its file after every one that it adds."""
+    pyuff = pytest.importorskip("pyuff")
+    read, refresh = [], pyuff.UFF.refresh
+
+    def counted(file):
+        path = Path(file._filename)
+        read.append(path.stat().st_size if path.exists() else 0)
+        return refresh(file)
+
+    monkeypatch.setattr(pyuff.UFF, "refresh", counted)
+    signals = [Signal(f"housing {number}", "m/s^2", 51_200, np.ones(1000)) for number in range(20)]
+    write_functions(signals, [], tmp_path / "a.uff")
+    assert max(read) < 3 * (tmp_path / "a.uff").stat().st_size / len(signals)
 
 
 @pytest.mark.decisive

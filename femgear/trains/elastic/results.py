@@ -988,12 +988,17 @@ def run_up_lines(runup: xr.Dataset, attributes: Mapping[str, Any]) -> tuple[Sens
     ``attributes`` are those of housing.nc: places of both, ring and air. A housing that stands still has
     several nodal diameters a line, and no microphone there.
     """
+    lines = _run_up_of_sensor(runup, attributes)
+    return lines, microphone_lines(lines, attributes) if lines.method == "exact" else None
+
+
+def _run_up_of_sensor(runup: xr.Dataset, attributes: Mapping[str, Any]) -> SensorLines:
+    """Read the lines of the sensor from runup.nc; see `run_up_lines`."""
     order, carrier = runup["order"].values, runup["carrier_speed"].values
     stored = runup["lines_real"].values + 1j * runup["lines_imag"].values
     displacement = -stored / (np.maximum(order, 1) * carrier[:, None]) ** 2
     place = float(attributes["sensor_angle"]), int(attributes["ring_teeth"])
-    lines = SensorLines(order, displacement, carrier, *place, runup.attrs.get("method", "exact"))
-    return lines, microphone_lines(lines, attributes) if lines.method == "exact" else None
+    return SensorLines(order, displacement, carrier, *place, runup.attrs.get("method", "exact"))
 
 
 def signal_extent(results: Results, rate: float) -> dict[str, tuple[float, float, float]]:
@@ -1012,7 +1017,7 @@ def order_cuts(results: Results, form: str) -> tuple[list[str], np.ndarray]:
     The table (n_speeds, columns) has the units of its heads. Its last column tells what a longer excitation changes the
     level of all lines [dB], NaN unknown.
     """
-    lines = run_up_lines(results.runup, results.housing.attrs)[0]
+    lines = _run_up_of_sensor(results.runup, results.housing.attrs)
     fluctuating = lines.order > 0
     levels = levels_of(lines.acceleration[:, fluctuating], lines.frequency[:, fluctuating], form)
     strongest = np.sort(np.argsort(-np.abs(lines.acceleration[:, fluctuating]).max(axis=0), kind="stable")[:_CUTS])
