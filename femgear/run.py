@@ -709,4 +709,3 @@ class _SoundFiles:
             write_csv(self._folder / "sound_quality.csv", header, self._rows)
             self._files.append("sound_quality.csv")
         return self._files
-

@@ -11,6 +11,7 @@ from typing import Any
 from nicegui import background_tasks, ui
 
 from femgear.app.fields import words
+from femgear.app.form import in_window
 from femgear.app.session import Session
 from femgear.app.worker import Worker, WorkerError
 
@@ -145,8 +146,8 @@ class AnswersPanel:
             self._send([{"what": "begin", "text": "reading the case"}])
         async for seen in self._bench.ask("look", text, name):
             if name == self._session.name:
-                self._seen = seen
-                self._tell_seen(seen)
+                self._seen = seen | {name: in_window(seen[name]) for name in ("problems", "findings")}
+                self._tell_seen(self._seen)
                 if not seen["problems"]:
                     self._offer_charts()
         if name != self._session.name or not self._seen:
@@ -203,7 +204,7 @@ class AnswersPanel:
         """Let the case be heard and describe it, once all numbers are there."""
         await self._show_gears(text, name)
         async for blocks in self._bench.ask("tables", text, name):
-            self._send([{"what": "tables", "blocks": blocks}])
+            self._send([{"what": "tables", "blocks": in_window(blocks)}])
         if self._listen.value and not self._changed.is_set():
             async for sound in self._bench.ask("sound", text, name):
                 self._show_sound(sound)
@@ -255,7 +256,8 @@ class AnswersPanel:
         """Show what became known with a stage."""
         messages: list[dict[str, Any]] = [{"what": "fresh", "stage": part["stage"]}]
         if part["sentence"] is not None:
-            messages.append({"what": "judge", "sentence": part["sentence"], "judgements": part["judgements"]})
+            judged = {"sentence": part["sentence"], "judgements": part["judgements"]}
+            messages.append({"what": "judge"} | in_window(judged))
         if part["charts"]:
             given = {name: part[name] for name in ("stage", "charts", "captions")}
             messages.append({"what": "draw"} | given)
@@ -269,9 +271,8 @@ class AnswersPanel:
         self._sound.clear()
         with self._sound:
             if sound is None:
-                ui.label("This kind of case has nothing to hear; femgear gearbox makes a gearbox of it.").classes(
-                    "hint"
-                )
+                hint = "This kind of case has nothing to hear: femgear casing gives it a casing with sensors."
+                ui.label(in_window(hint)).classes("hint")
                 return
             ui.label(f"{words(sound['name'])}, largest {sound['largest']:.3g} {sound['unit']}").classes("hint")
             ui.audio(f"data:audio/wav;base64,{sound['wav']}", autoplay=True, loop=True).classes("h-8")

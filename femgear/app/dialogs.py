@@ -19,6 +19,29 @@ _FIRST = {"module": "2 mm", "speed": "1000 rpm", "treatment": "case hardened ste
 """What stands in the fields of a new case at first."""
 _TEETH = {"planetary": "17 37 91", "pair": "17 40", "drivetrain": "17 40", "gearbox": "17 40"}
 """Teeth that are offered, by kind, where they are not those of `KINDS`."""
+_KIND_WORDS = {
+    "planetary": "planetary set: elastic ring, safeties and sound",
+    "pair": "pair of gears",
+    "planar": "planetary set of rigid bodies in the plane",
+    "helical": "helical planetary set of rigid bodies in space",
+    "drivetrain": "gearbox of a pair, followed in time",
+    "gearbox": "gearbox of a pair: shafts and bearings",
+    "stepped": "gearbox with stepped planets",
+    "double": "gearbox with pairs of planets",
+    "ravigneaux": "gearbox of a Ravigneaux set",
+    "wolfrom": "gearbox of a Wolfrom set (3K)",
+}
+"""Kinds of cases, in words."""
+_ORDER = {
+    "stepped": "sun, first and second gear of the planets, ring",
+    "double": "sun, inner and outer planets, ring",
+    "ravigneaux": "small and large sun, short and long planets, ring",
+    "wolfrom": "sun, first gear of the planets, its ring, second gear, its ring",
+}
+"""Order of the teeth of a kind of sets."""
+_OF_SET, _OF_PAIR = "sun, planet, ring", "pinion, wheel"
+_HELICAL = {"helical": "20 deg"}
+"""Helix angle where none is given, by kind."""
 _HINTS = {
     "planets": "as equal spacing allows",
     "face_width": "twelve modules",
@@ -54,6 +77,9 @@ def ask_new(
             kind = str(fields["kind"].value)
             fields["name"].value = free_name(kind)
             fields["teeth"].value = _TEETH.get(kind, " ".join(map(str, KINDS[kind])))
+            order = _ORDER.get(kind, _OF_PAIR if len(KINDS[kind]) == 2 else _OF_SET)
+            fields["teeth"].props(f'hint="{order}"')
+            fields["helix"].props(f'placeholder="{_HELICAL.get(kind, _HINTS["helix"])}"')
             for name, field in fields.items():
                 field.visible = name in asked_fields(kind)
 
@@ -75,7 +101,8 @@ def ask_new(
 def _field_of_new(name: str, label: str) -> Any:
     """Draw a field of a new case, whose mistake is forgotten as soon as it is changed."""
     if name == "kind":
-        return ui.select(list(KINDS), value="planetary", label=label).classes("w-full")
+        words = {kind: _KIND_WORDS[kind] for kind in KINDS}
+        return ui.select(words, value="planetary", label=label).classes("w-full")
     if name == "treatment":
         field: Any = ui.select(["", *map(str, get_args(Treatment))], value=_FIRST[name], label=label).classes("w-full")
     else:

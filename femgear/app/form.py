@@ -198,6 +198,28 @@ def sentence_of(said: Mapping[str, str]) -> str:
     return f"{said['text']}{limit}{remedy}{code}"
 
 
+_IN_WINDOW = {
+    "casing": "“Gearbox › In a casing”",
+    "gearbox": "“Gearbox › As a gearbox”",
+    "run": "“Run”",
+    "compare": "“Results › Compare”",
+    "export": "“Results › Export”",
+    "import": "“Import”",
+    "new": "“New”",
+}
+"""What one does in the window in place of a command."""
+_COMMAND = re.compile(rf"`?\bfemgear ({'|'.join(_IN_WINDOW)})\b(?: (?:CASE|FILE)\b)?`?(?! -)")
+
+
+def in_window(said: Any) -> Any:
+    """Name what one does in the window in place of commands, in a text or in all of those of a list or table."""
+    if isinstance(said, str):
+        return _COMMAND.sub(lambda match: _IN_WINDOW[match[1]], said)
+    if isinstance(said, Mapping):
+        return {name: in_window(part) for name, part in said.items()}
+    return [in_window(part) for part in said] if isinstance(said, (list, tuple)) else said
+
+
 def typed_value(entry: Entry, text: str) -> Any:
     """Turn what was typed into a field into the value of the entry; None of an empty field.
 

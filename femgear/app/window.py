@@ -17,14 +17,17 @@ from femgear.app.answers_panel import ANSWERS_SCRIPT, AnswersPanel
 from femgear.app.dialogs import ask_import, ask_name, ask_new, file_name
 from femgear.app.document import tables_of_text
 from femgear.app.fields import Form, form_of_model
-from femgear.app.form import sentence_of
+from femgear.app.form import in_window, sentence_of
 from femgear.app.new_case import drafted_case
 from femgear.app.runs import serve_runs
 from femgear.app.runs_panel import RunsPanel
 from femgear.app.session import SUFFIX, Session, case_files, first_shown
 from femgear.app.sliders import Sliders
 from femgear.app.worker import Worker, WorkerError, serve_bench
+from femgear.case import text as case_text
 from femgear.errors import FemgearError
+from femgear.trains.gearbox_of_case import case_in_casing, gearbox_of_case
+from femgear.trains.reading import parse_case
 
 _ENDED = Path(__file__).parent / "web" / "ended.js"
 _CSS = """
@@ -120,6 +123,9 @@ class Window:
                 ("Save as", "save_as", self._save_as),
             ):
                 ui.button(text, icon=icon, on_click=act).props("flat dense no-caps color=white")
+            with ui.button("Gearbox", icon="settings").props("flat dense no-caps color=white"), ui.menu():
+                ui.menu_item("As a gearbox", lambda: self._make_gearbox("gearbox"))
+                ui.menu_item("In a casing", lambda: self._make_gearbox("in_casing"))
             for text, icon, act in (
                 ("Undo", "undo", self._undo),
                 ("Redo", "redo", self._redo),
@@ -352,7 +358,7 @@ class Window:
             ui.label(f"{key}{said['text']}{code}{limit}{remedy}").classes("said")
 
     def _notify(self, text: str, kind: Any = "info") -> None:
-        ui.notify(text, type=kind, multi_line=True, classes="said", timeout=6000, close_button="Close")
+        ui.notify(in_window(text), type=kind, multi_line=True, classes="said", timeout=6000, close_button="Close")
 
     # new cases, runs
 
@@ -373,6 +379,19 @@ class Window:
             self.session.begin(name, text)
             self._begin("")
         return problems
+
+    async def _make_gearbox(self, shape: str) -> None:
+        """Make a new case of this one: a gearbox, or one in a casing with sensors, so that it is heard."""
+        text, name = self.session.text, self.session.name
+        if not name:
+            return
+        try:
+            made, findings = await asyncio.to_thread(_as_gearbox, text, str(self.session.path), shape == "in_casing")
+            self.session.begin(self._free_name(f"{name.removesuffix(SUFFIX)}_{shape}"), made)
+        except (FemgearError, OSError) as error:
+            self._notify(str(error), "negative")
+            return
+        self._begin("; ".join(findings)[:600])
 
     def _free_name(self, stem: str) -> str:
         """Name of a case file that is not there yet."""
@@ -423,6 +442,18 @@ class Window:
         finally:
             self._bench.stop()
             self._runs_panel.stop()
+
+
+def _as_gearbox(text: str, name: str, in_casing: bool) -> tuple[str, list[str]]:
+    """Write the text of a case as that of a gearbox, perhaps in a casing; what is left out and estimated, in words."""
+    case = parse_case(text, name=name)
+    if in_casing:
+        text, findings = case_in_casing(case, text, name)
+    else:
+        written = gearbox_of_case(case)
+        text, findings = case_text.write(written.tables), written.findings
+        parse_case(text, name=name)
+    return text, [finding.text for finding in findings]
 
 
 def _ended_script(folder: Path) -> str:

@@ -183,24 +183,13 @@ def casing(
     force
         Replace the file.
     """
-    from femgear.case import text as case_text
-    from femgear.trains.gearbox_of_case import gearbox_of_case
-    from femgear.trains.reading import parse_case, read_case
-    from femgear.trains.registry import train_of
+    from femgear.case.text import read_text
+    from femgear.trains.gearbox_of_case import case_in_casing
+    from femgear.trains.reading import read_case
 
-    read, text = read_case(case), case_text.read_text(case)
-    former, findings = any(finding.code == "W-FORMER" for finding in read.notices), ()
-    if train_of(read).draft_casing is None or former:
-        written = gearbox_of_case(read)
-        text, findings = case_text.write(written.tables), written.findings
-        read = parse_case(text, name=str(case))
-    draft = train_of(read).draft_casing
-    assert draft is not None
-    tables, estimates = draft(read)
     output = output or case.with_name(f"{case.stem}_in_casing.toml")
-    text = f"{text.rstrip()}\n\n{tables}"
-    parse_case(text, name=str(output))  # what is no case is refused before a file is written
-    print_warnings(warning_lines((*findings, *estimates), whole=True))
+    text, findings = case_in_casing(read_case(case), read_text(case), str(output))
+    print_warnings(warning_lines(findings, whole=True))
     write_case_file(text, output, force=force)
     say(f"next:    femgear run {shlex.quote(str(output))}")
     return 0

@@ -19,6 +19,8 @@ from femgear.case.quantities import RPM
 from femgear.errors import CaseError
 from femgear.findings import Finding
 from femgear.gears.profile import base_helix_angle
+from femgear.trains.reading import parse_case
+from femgear.trains.registry import train_of
 
 _CASING = "casing"
 PAIR, SET = "pair", "set"
@@ -101,6 +103,44 @@ def gearbox_of_case(case: Any) -> WrittenAsGearbox:
         tables["losses"] = given["losses"] | {"seal": seals}
     kept = {key: value for key, value in tables.items() if value not in ([], {})}
     return WrittenAsGearbox(kept, tuple(_left_out(case, given)))
+
+
+def case_in_casing(case: Any, text: str, name: str) -> tuple[str, tuple[Finding, ...]]:
+    """Write a case as a gearbox in a rigid casing on feet with sensors and a run-up, all estimated.
+
+    Parameters
+    ----------
+    case : Case
+        Of a gearbox without a casing, or as `gearbox_of_case` takes it.
+    text : str
+        Of its file.
+    name : str
+        Of the file, for messages.
+
+    Returns
+    -------
+    text : str
+        Of the case file.
+    findings : tuple of Finding
+        What the gearbox leaves out, and what is estimated.
+
+    Raises
+    ------
+    CaseError
+        As of `gearbox_of_case`; a gearbox that has a casing, or sensors.
+    """
+    findings = tuple[Finding, ...]()
+    former = any(finding.code == "W-FORMER" for finding in case.notices)
+    if train_of(case).draft_casing is None or former:
+        written = gearbox_of_case(case)
+        text, findings = case_text.write(written.tables), written.findings
+        case = parse_case(text, name=name)
+    draft = train_of(case).draft_casing
+    assert draft is not None
+    tables, estimates = draft(case)
+    text = f"{text.rstrip()}\n\n{tables}"
+    parse_case(text, name=name)  # what is no case is refused before a file is written
+    return text, (*findings, *estimates)
 
 
 def quantity(value: float, unit: str) -> str:

@@ -9,6 +9,7 @@ from femgear.app.document import entry_of
 from femgear.app.form import (
     Entry,
     Table,
+    in_window,
     keys_of,
     shown_value,
     slider_of,
@@ -176,3 +177,18 @@ def test_places_of_a_slider_are_round_numbers(value, step, moved):
     assert slider.step == step and (slider.high - slider.low) / step >= 200 - 1e-6
     number = moved if isinstance(moved, float) else float(moved.split()[0])
     assert abs(number / step - round(number / step)) < 1e-6 and slider.entry_value(number) == moved
+
+
+@pytest.mark.parametrize(
+    ("said", "words"),
+    [
+        ("femgear casing CASE makes a gearbox of it", "“Gearbox › In a casing” makes a gearbox of it"),
+        ("write it as a gearbox: femgear gearbox CASE", "write it as a gearbox: “Gearbox › As a gearbox”"),
+        ("femgear compare with a run", "“Results › Compare” with a run"),
+        ("femgear run --only static computes", "femgear run --only static computes"),
+        ("femgear runs on", "femgear runs on"),
+        ("femgear measured tells", "femgear measured tells"),
+    ],
+)
+def test_commands_are_what_one_does_in_the_window(said, words):
+    assert in_window([{"text": said, "number": 1.0}]) == [{"text": words, "number": 1.0}]
