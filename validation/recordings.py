@@ -83,7 +83,12 @@ def recording(
     turns = carrier * (time + wander * (1 - np.cos(2 * np.pi * 0.23 * time)) / (2 * np.pi * 0.23))
     signal = np.zeros_like(time)
     for at, amplitude in zip(order, value, strict=True):
-        signal += np.real(amplitude * np.exp(2j * np.pi * at * turns))
+        # the real part of amplitude times exp(i phase): most amplitudes are real, and exp takes three times as long
+        phase = 2.0 * np.pi * at * turns
+        if np.real(amplitude):
+            signal += np.real(amplitude) * np.cos(phase)
+        if np.imag(amplitude):
+            signal -= np.imag(amplitude) * np.sin(phase)
     signal += noise * np.abs(list(value)).max() * np.random.default_rng(seed).normal(size=len(time))
     sun = 5.0 * turns  # 1 + 108/27 turns in one of the carrier
     pulses = 5.0 * (np.mod(sun, 1.0) < 0.1) if logic else 5.0 * np.exp((np.cos(2.0 * np.pi * sun) - 1.0) / 0.1)

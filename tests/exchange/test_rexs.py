@@ -447,16 +447,16 @@ def test_entities_are_refused_in_every_encoding(tmp_path, codec):
 
 
 @pytest.mark.parametrize(
-    "text",
+    ("before", "element", "count", "behind"),
     [
-        "<model version='1.4'>" + "<a/>" * 4_700_000 + "</model>",
-        '{"model": {"version": "1.4", "components": [' + "{}," * 6_300_000 + "{}]}}",
+        ("<model version='1.4'>", "<a/>", 4_700_000, "</model>"),
+        ('{"model": {"version": "1.4", "components": [', "{},", 6_300_000, "{}]}}"),
     ],
     ids=["xml", "json"],
 )
-def test_files_of_nothing_but_elements_are_refused_at_once(tmp_path, text):
+def test_files_of_nothing_but_elements_are_refused_at_once(tmp_path, before, element, count, behind):
     path = tmp_path / "stage.rexs"
-    path.write_text(text, encoding="utf-8")
+    path.write_text(before + element * count + behind, encoding="utf-8")
     start = time.process_time()
     with pytest.raises(CaseError, match="are too many") as caught:
         read_model(path)

@@ -1,6 +1,7 @@
 """femgear.measured.recordings: files of all formats by the end of their names, and what tells their angle."""
 
 import re
+from functools import cache
 
 import numpy as np
 import pytest
@@ -86,15 +87,19 @@ def test_a_start_from_rest_is_left_out_as_the_refusal_says(tmp_path):
     assert height == pytest.approx([abs(HEALTHY[round(at)]) for at in order], rel=0.05)
 
 
+@cache
+def unequal_sun() -> np.ndarray:
+    """Eight seconds of all whole orders that a sun of unequal teeth makes at three turns a second."""
+    time, order = np.arange(8 * 6400) / 6400.0, np.arange(90, 700)
+    height = np.choose(order % 3, [0.1, 1.0, 0.3]) * (order / 330) ** 2
+    return sum(a * np.cos(2 * np.pi * n * 3.0 * time + n * n) for n, a in zip(order.tolist(), height.tolist()))
+
+
 @pytest.mark.parametrize("within", [None, 0.003])
 @pytest.mark.parametrize("nominal", [900.0, 899.0])
 def test_loud_lines_of_a_fault_do_not_shift_a_speed(nominal, within, tmp_path, recwarn):
     """A sun of unequal teeth makes all whole orders, two thirds of them no multiples of three and louder than those."""
-    seconds, rate = 8.0, 6400.0
-    time, order = np.arange(int(seconds * rate)) / rate, np.arange(90, 700)
-    height = np.choose(order % 3, [0.1, 1.0, 0.3]) * (order / 330) ** 2
-    signal = sum(a * np.cos(2 * np.pi * n * 3.0 * time + n * n) for n, a in zip(order.tolist(), height.tolist()))
-    wavfile.write(tmp_path / "a.wav", int(rate), signal.astype(np.float32))
+    wavfile.write(tmp_path / "a.wav", 6400, unequal_sun().astype(np.float32))
     over_angle = read_by_turns(tmp_path / "a.wav", Recording(speed=f"{nominal} rpm", within=within), HEARD)
     # the mean speed is that over whole turns less a sample
     assert over_angle.speed == pytest.approx(3.0 if within else nominal / 300, rel=5e-5)

@@ -92,7 +92,7 @@ def test_what_must_not_come_out_of_a_case_file_is_a_failure(happens, words, fold
     number = 4  # a mutant of a case without teeth, which is read at once
     case_text._warm(folder, number)
     monkeypatch.setattr(case_text, "_described", happens)
-    gc.collect()  # memory that is freed meanwhile would hide what is taken
+    gc.freeze()  # memory that is freed meanwhile would hide what is taken
     tally = trials.run_trials("case_text", [number], folder)
     assert tally.failed == 1 and words in tally.failures[0]
     assert tally.failures[0].startswith(f"python validation/soak case_text {number}: ")
