@@ -35,6 +35,7 @@ _BARE = re.compile(r"[A-Za-z0-9_-]+")
 _HEADER = re.compile(r"\s*(\[\[?)([^\[\]#]+)\]")
 _ENTRY = re.compile(r"\s*+([A-Za-z0-9_.\"' -]++)\s*+=")
 _KEY = re.compile(r"=+|^[ \t]*\[", re.MULTILINE)
+_QUOTED = json.JSONEncoder(ensure_ascii=False).encode
 _TEXT = re.compile(r""""[^"]*"|'[^']*'|#.*""")
 # tomllib needs a time that grows with the square of the parts of a dotted key.
 _LONG_KEY = re.compile(r"(?<![\w-])(?:[\w-]+[ \t]*\.[ \t]*|\"[^\"\n]*\"[ \t]*\.[ \t]*|'[^'\n]*'[ \t]*\.[ \t]*){7}")
@@ -355,7 +356,7 @@ def _value(value: object) -> str:
         return float.__repr__(value)  # NumPy's numbers are floats as well
     if isinstance(value, str | int):
         # as in JSON, but that TOML escapes DEL as well
-        return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
+        return _QUOTED(value).replace("\x7f", "\\u007f")
     if isinstance(value, list | tuple):
         return "[" + ", ".join(_value(item) for item in value) + "]"
     if isinstance(value, dict):

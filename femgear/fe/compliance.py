@@ -541,7 +541,10 @@ def sector_harmonics(schur: SectorSchur, harmonics) -> np.ndarray:
     size = 8.0 * ties.shape[-1] * (ties.shape[-1] + 4 * (loaded + observed))
     for rows in np.array_split(np.arange(len(harmonics)), -(-len(harmonics) * size // _BLOCK) or 1):
         tie = ties[rows][..., None]
-        A = (tie * schur.stiffness * tie.swapaxes(2, 3)).sum(axis=1)
+        A, part = (tie[:, i] * schur.stiffness[i] for i in (0, 1))
+        A *= tie[:, 0].swapaxes(1, 2)
+        part *= tie[:, 1].swapaxes(1, 2)
+        A += part
         # rotation is the harmonic 0, translation the first
         rigid = np.isin(harmonics[rows] % schur.count, (0, 1, schur.count - 1))
         values = np.linalg.eigvalsh(A[rigid])

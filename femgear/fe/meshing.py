@@ -282,7 +282,8 @@ def estimate_elements(plan: Plan) -> float:
     count = 0.0
     for block in np.array_split(samples, 1 + len(samples) * len(length) // 2_000_000):
         block = block[_contains(plan.points, plan.segments[: plan.n_boundary], block)]
-        weight = length / (((block[:, None] - middle) ** 2).sum(axis=2) + 0.25 * length**2)
+        away = (block[:, None, 0] - middle[:, 0]) ** 2 + (block[:, None, 1] - middle[:, 1]) ** 2
+        weight = length / (away + 0.25 * length**2)
         size = (weight * length).sum(axis=1) / weight.sum(axis=1)
         count += float(np.sum(np.prod(step) / (0.25 * np.sqrt(3) * size**2)))
     return count + len(length)
