@@ -8,6 +8,7 @@ from functools import cache
 from pathlib import Path
 
 import numpy as np
+from scipy.linalg import solve
 from scipy.sparse import block_diag, coo_array, csc_array, csr_array
 
 from femgear.case.dependencies import Steps
@@ -80,7 +81,7 @@ def cut_ring(whole: WholeSchur, cracked: WholeSchur, count: int) -> np.ndarray:
         matrix[np.ix_(rows, rows)] += sector.stiffness
         loads[np.ix_(rows, columns)] += sector.load_cut
         compliance[np.ix_(columns, columns)] += sector.compliance
-    return compliance + loads.T @ np.linalg.solve(matrix, loads)
+    return compliance + loads.T @ solve(matrix, loads, assume_a="pos")
 
 
 def update_identity() -> tuple[Row, ...]:

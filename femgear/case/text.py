@@ -38,7 +38,10 @@ _KEY = re.compile(r"=+|^[ \t]*\[", re.MULTILINE)
 _QUOTED = json.JSONEncoder(ensure_ascii=False).encode
 _TEXT = re.compile(r""""[^"]*"|'[^']*'|#.*""")
 # tomllib needs a time that grows with the square of the parts of a dotted key.
-_LONG_KEY = re.compile(r"(?<![\w-])(?:[\w-]+[ \t]*\.[ \t]*|\"[^\"\n]*\"[ \t]*\.[ \t]*|'[^'\n]*'[ \t]*\.[ \t]*){7}")
+_LONG = 7
+_LONG_KEY = re.compile(
+    r"(?<![\w-])(?:[\w-]+[ \t]*\.[ \t]*|\"[^\"\n]*\"[ \t]*\.[ \t]*|'[^'\n]*'[ \t]*\.[ \t]*)" f"{{{_LONG}}}"
+)
 
 
 def read_text(path: str | os.PathLike) -> str:
@@ -100,7 +103,9 @@ def parse(text: str, name: str) -> dict:
     ``name`` is that of the file, for messages. CaseError: syntax, with line and column, a key given twice,
     with both lines, or nested too deeply (E-TOML); E-FINITE, with keys and lines.
     """
-    if len(_LONG_KEY.findall(text)) > _MOST_LONG_KEYS:
+    # such a key stands on one line, and most texts have no line with so many dots
+    suspects = (line for line in text.split("\n") if line.count(".") >= _LONG)
+    if sum(len(_LONG_KEY.findall(line)) for line in suspects) > _MOST_LONG_KEYS:
         raise _too_deep(name)
     if (count := len(_KEY.findall(text))) > _MOST_KEYS:
         limit = f"{_MOST_KEYS} keys and tables"

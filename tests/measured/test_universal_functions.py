@@ -118,6 +118,7 @@ def test_channels_of_one_name_are_told_apart_by_their_place(tmp_path):
     assert [channel.name for channel in read_universal_signals(tmp_path / "a.uff")] == ["left 1:+3", "left 2:+3"]
 
 
+BEGUN = b"    -1\n    58\n"
 GOOD = by_hand(4, REAL.astype("<f8").tobytes(), even=True)
 
 
@@ -135,7 +136,9 @@ GOOD = by_hand(4, REAL.astype("<f8").tobytes(), even=True)
         (GOOD.replace(b"         4       129", b"         7       129"), "no known type"),
         (GOOD.replace(b"         4       129", b"         4 999999999"), "broken off"),
         (GOOD.replace(b"1.25000e-01", b"0.00000e+00"), "without a step"),
-        pytest.param(lambda: b"    -1\n    58\n" + b"x" * 20_000_000 + b"\n    -1\n", "missing or too long", id="data11"),
+        pytest.param(
+            lambda: b"    -1\n    58\n" + b"x" * 20_000_000 + b"\n    -1\n", "missing or too long", id="data11"
+        ),
         pytest.param(lambda: b"    -1\n    58\n" + b"x" * 20_000_000, "does not end by -1", id="data12"),
     ],
 )

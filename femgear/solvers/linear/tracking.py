@@ -357,8 +357,8 @@ def _critical(tracked: TrackedModes, orders) -> tuple[CriticalSpeed, ...]:
     speeds = []
     apart = 1e-9 * np.ptp(speed)
     for order in orders:
-        for branch, frequency in enumerate(angular.T):
-            roots = np.sort(PchipInterpolator(speed, frequency - order * speed).roots(extrapolate=False))
+        curves = PchipInterpolator(speed, angular - order * speed[:, None])
+        for branch, roots in enumerate(map(np.sort, curves.roots(extrapolate=False))):
             # a root at a knot is found from both sides
             for s in roots[np.append(True, np.diff(roots) > apart)[: len(roots)]]:
                 speeds.append(CriticalSpeed(float(s), float(order * s / (2 * np.pi)), branch, float(order)))

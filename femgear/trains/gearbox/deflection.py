@@ -45,6 +45,7 @@ _UPRIGHT = 1e-7
 # below which they are near at any rate [m].
 _COARSE, _NEAR, _NEARLY_UPRIGHT = 12, 3e-3, 1e-6
 _SETTLED = 1e-11  # residual force over the largest one
+_LOOSE = 1e-11  # scaled stiffness of a motion that nothing holds, over the largest one
 _LEAST_LOAD = 1e-3  # against which residuals count where nothing loads a gearbox [N]
 # Differences of torque, relative, and of misalignment over the width [m] up to which equal teeth are one contact.
 _COPIED, _COPIED_LENGTH = 1e-9, 1e-14
@@ -505,10 +506,13 @@ def _check_held(model: GearboxModel, fixed: Assembly, T, K, W, k, laws) -> None:
     reduced = T.T @ tangent @ T
     size = np.sqrt(np.abs(np.diag(reduced)))
     size[size == 0.0] = 1.0
-    values, vectors = np.linalg.eigh(reduced / np.outer(size, size))
-    loose = values < 1e-11 * values[-1] if len(values) else np.zeros(0, bool)
-    if not loose.any():
+    scaled = reduced / np.outer(size, size)
+    # the motions themselves, which take as long again, matter to a refusal alone
+    values = np.linalg.eigvalsh(scaled)
+    if not len(values) or values[0] >= _LOOSE * values[-1]:
         return
+    values, vectors = np.linalg.eigh(scaled)
+    loose = values < _LOOSE * values[-1]
     motion = T @ (vectors[:, loose] / size[:, None])
     if CASING in fixed.names:
         check_casing_held(

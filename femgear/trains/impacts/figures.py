@@ -83,8 +83,8 @@ def state_bands(rows: Sequence[tuple]) -> Figure:
         order = np.argsort(parameter)
         at, value = np.asarray(parameter, float)[order], np.asarray(state)[order]
         edges = np.concatenate([at[:1], 0.5 * (at[1:] + at[:-1]), at[-1:]])
-        for number, (low, high) in enumerate(pairwise(edges)):
-            ax.barh(place, high - low, left=low, height=0.7, color=STATE_COLOURS[value[number]], linewidth=0)
+        colours = [STATE_COLOURS[number] for number in value]
+        ax.barh(np.full(len(at), place), np.diff(edges), left=edges[:-1], height=0.7, color=colours, linewidth=0)
         if len(at) <= _SPARSE:
             mark = {"marker": ".", "color": BLACK, "markersize": 2.5, "linestyle": "none"}
             ax.plot(at, np.full(len(at), place), **mark, label=None if marked else "computed ratios")
