@@ -293,7 +293,10 @@ _LIBRARIES = {
 """Libraries of formats that need one of the extra ``nvh``."""
 """Formats of what a test bench would record."""
 _WORTH_KEEPING = 10.0
-"""Seconds of stages after which they are kept for a run that is killed: less is computed again as soon."""
+"""Seconds of stages after which their files are written, and what a killed run goes on from.
+
+Less is computed again as soon, and its verdict comes before the files are written.
+"""
 _LOSS = -0.1
 """Change of the level that is told when a rate leaves lines out [dB]."""
 
@@ -316,6 +319,8 @@ class _Run:
         Findings of every stage, under "" those of the case.
     pending : dict
         Results that a run could go on from and that are not written yet.
+    unwritten : dict
+        Contents of stages, by name, whose files are not written yet.
     steps : Steps
         What its stages have in common, such as the excitation of dynamics and run-up.
     """
@@ -327,23 +332,38 @@ class _Run:
     data: dict[str, Contents | xr.Dataset] = field(default_factory=dict)
     findings: dict[str, tuple[Finding, ...]] = field(default_factory=dict)
     pending: dict[str, Any] = field(default_factory=dict)
+    unwritten: dict[str, Contents | xr.Dataset] = field(default_factory=dict)
     steps: Steps = field(default_factory=Steps)
 
     def keep(self, case: ReadCase, *, least: float = 0.0) -> None:
-        """Write the pending results of a case, those of ``least`` seconds or more."""
+        """Write files and pending results of the stages of a case, those of ``least`` seconds or more."""
         if not self.pending or sum(self.timings[name] for name in self.pending) < least:
             return
+        self.write()
         for name, result in self.pending.items():
             write_result(result, self.folder / _kept_name(name), fingerprint=_fingerprint(case))
         self.record(*map(_kept_name, self.pending))
         self.pending.clear()
 
+    def write(self) -> None:
+        """Write the files of the stages that are not written yet."""
+        if not self.unwritten:
+            return
+        for name, data in self.unwritten.items():
+            write_dataset(data, self.folder / f"{name}.nc")
+        names = [f"{name}.nc" for name in self.unwritten]
+        self.unwritten.clear()
+        self.record(*names)
+
+    def all_findings(self) -> tuple[Finding, ...]:
+        """What deserves a look so far, each once."""
+        return once(finding for stage in self.findings.values() for finding in stage)
+
     def record(self, *names: str, complete: bool = False) -> Manifest:
         """Write the manifest with some more files."""
         others = {name: digest for name, digest in self.files.items() if name not in names}
-        findings = once(finding for stage in self.findings.values() for finding in stage)
         entries = {"timings": self.timings, "convergence": self.convergence, "checksums": others}
-        entries["findings"] = findings
+        entries["findings"] = self.all_findings()
         manifest = record(self.folder, list({**self.files, **dict.fromkeys(names)}), **entries, complete=complete)
         self.files = dict(manifest.files)
         return manifest
@@ -385,6 +405,7 @@ def run_case(
             run.data |= {name: read_dataset(folder / f"{name}.nc") for name in files}
         if computed is not None:
             computed(_results_so_far(run))
+        run.write()
         if pictures:
             _draw(run, case, {name: result for name, result in results.items() if result is not None}, progress)
     except BaseException:
@@ -398,8 +419,10 @@ def run_case(
 
 def _results_so_far(run: _Run, *names: str) -> Results:
     """Results of the stages that are computed, with some more files, as those of a complete run."""
-    manifest = run.record(*names)
-    shown = replace(manifest, complete=True, files=_without_kept(manifest.files))
+    if names:
+        run.record(*names)
+    files = _without_kept(run.files) | {f"{name}.nc": "" for name in run.unwritten}
+    shown = Manifest(True, files, dict(run.timings), dict(run.convergence), versions(), run.all_findings())
     return Results(run.folder, shown, read_case).with_known(run.data)
 
 
@@ -442,16 +465,16 @@ def _compute(
                 computed = (
                     first if member is stage else member.solve(part, first, **_options(member, progress, run.steps))
                 )
-                path, data = run.folder / f"{member.name}.nc", _contents(computed)
+                data = _contents(computed)
                 if part is case:
                     run.findings[member.name] = member.findings(data)
                     data.attrs["findings"] = as_text(member.carried(run.findings))
-                    write_dataset(data, path)
-                    run.data[member.name] = data
+                    run.data[member.name] = run.unwritten[member.name] = data
                 else:
                     if member.name not in files:
                         share = len(part.operation.speeds) / len(case.operation.speeds)
-                        files[member.name] = opened.enter_context(replaced_file(path, size=data.nbytes / share))
+                        path, size = run.folder / f"{member.name}.nc", data.nbytes / share
+                        files[member.name] = opened.enter_context(replaced_file(path, size=size))
                     append_dataset(data, files[member.name], "speed")
                 results[member.name] = computed if part is case else None
                 verdicts[member.name].append(member.convergence(computed))
@@ -462,15 +485,15 @@ def _compute(
                 with read_dataset(files[member.name]) as data:
                     run.findings[member.name] = member.findings(data)
                 write_attribute(files[member.name], "findings", as_text(member.carried(run.findings)))
-    names = []
     for member in members:
         run.timings[member.name] = seconds[member.name]
         codes = [finding.code for finding in run.findings[member.name] if finding.code]
         run.convergence[member.name] = joint_verdict(verdicts[member.name]) | {"findings": codes}
-        names.append(f"{member.name}.nc")
         run.pending[member.name] = results[member.name]
         progress(member.name, 1, 1)
-    run.record(*names)
+    if files:
+        run.write()
+        run.record(*(f"{name}.nc" for name in files))
 
 
 def _contents(result: Any) -> Contents | xr.Dataset:
