@@ -9,7 +9,7 @@ from collections import defaultdict
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, suppress
 from dataclasses import dataclass, field, replace
-from functools import cache
+from functools import cache, partial
 from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -32,6 +32,7 @@ from femgear.exchange.formats import (
 from femgear.exchange.sampling import Sampling
 from femgear.findings import Finding, as_text, once, remark, tell
 from femgear.housing.sound import sound_quality
+from femgear.second_process import second_core, shared
 from femgear.stages.protocol import (
     Drawn,
     Progress,
@@ -321,6 +322,8 @@ class _Run:
         Results that a run could go on from and that are not written yet.
     unwritten : dict
         Contents of stages, by name, whose files are not written yet.
+    ahead : dict
+        Result, or the error instead of it, and seconds of stages, by name, that were solved before their turn.
     steps : Steps
         What its stages have in common, such as the excitation of dynamics and run-up.
     """
@@ -333,6 +336,7 @@ class _Run:
     findings: dict[str, tuple[Finding, ...]] = field(default_factory=dict)
     pending: dict[str, Any] = field(default_factory=dict)
     unwritten: dict[str, Contents | xr.Dataset] = field(default_factory=dict)
+    ahead: dict[str, tuple[Any, float]] = field(default_factory=dict)
     steps: Steps = field(default_factory=Steps)
 
     def keep(self, case: ReadCase, *, least: float = 0.0) -> None:
@@ -381,10 +385,10 @@ def run_case(
 ) -> Mapping[str, xr.Dataset]:
     """Compute a case and write its results; goes on from the stages of an interrupted run of the same case.
 
-    Into a folder from `femgear.storage.results.run_folder`, whose manifest says after every stage what is
-    there; up to the stage ``only``, whatever the case says of it; ``pictures`` are figures, fields and
-    report; ``progress`` is called with (stage, done, total), ``computed`` with the results once all stages
-    are done, before anything is drawn. Returns the contents of the files, by stage, those that were written
+    Into a folder from `femgear.storage.results.run_folder`, whose manifest says what is there: stages are
+    written after `_WORTH_KEEPING` seconds, when all are done, or when an error ends the run. Stages go up to
+    ``only``, whatever the case says of it; ``pictures`` are figures, fields and report. ``progress`` is called
+    with (stage, done, total), ``computed`` with the results of all stages, before these are written and drawn. Returns the contents of the files, by stage, those that were written
     part by part only where they were drawn or told.
     """
     requested, stages = _asked(case, only)
@@ -396,8 +400,9 @@ def run_case(
     run.record("case.toml")
     own_files(folder / KEPT, ["*"])
     try:
-        for stage in stages:
+        for stage, follower in zip(stages, (*stages[1:], None)):
             if stage.name not in run.timings:
+                _solve_together(run, requested, stage, follower, results, progress)
                 _compute(run, requested, stage, stages, results, progress)
                 run.keep(requested, least=_WORTH_KEEPING)
         if pictures or computed is not None:
@@ -446,6 +451,34 @@ def _without_kept(files: Mapping[str, str]) -> dict[str, str]:
     return {name: digest for name, digest in files.items() if not name.startswith(KEPT)}
 
 
+def _solve_together(
+    run: _Run, case: Any, stage: Stage, follower: Stage | None, results: dict[str, Any], progress: Progress
+) -> None:
+    """Solve a stage in a second process while this one solves the stage after it, where neither needs the other.
+
+    What a stage leaves in the steps of the run would be lost with the process.
+    """
+    if follower is None or stage.name in follower.takes or "steps" in stage.options or run.ahead:
+        return
+    if stage.parts or follower.parts or follower.name in run.timings or not second_core():
+        return
+
+    def solved(member: Stage) -> tuple[Any, float]:
+        """Result of a stage, or its error, which is raised in its turn, and seconds."""
+        start = time.perf_counter()
+        try:
+            result = member.solve(case, *map(results.get, member.takes), **_options(member, progress, run.steps))
+        except Exception as error:
+            result = error
+        return result, time.perf_counter() - start
+
+    def solve_follower() -> None:
+        run.ahead[follower.name] = solved(follower)
+
+    progress(follower.name, 0, 1)
+    run.ahead[stage.name] = shared([partial(solved, stage)], solve_follower)[0]
+
+
 def _compute(
     run: _Run, case: Any, stage: Stage, stages: Sequence[Stage], results: dict[str, Any], progress: Progress
 ) -> None:
@@ -455,7 +488,12 @@ def _compute(
     taken, options = map(results.get, stage.takes), _options(stage, progress, run.steps)
     seconds, start = defaultdict(float), time.perf_counter()
     progress(stage.name, 0, 1)
-    if stage.parts is None:
+    if stage.name in run.ahead:
+        result, seconds[stage.name] = run.ahead.pop(stage.name)
+        if isinstance(result, Exception):
+            raise result
+        parts = iter([(case, result)])
+    elif stage.parts is None:
         parts = iter([(case, stage.solve(case, *taken, **options))])
     else:
         parts = stage.parts(case, *taken, **options)

@@ -13,7 +13,7 @@ from casings import casing_tables
 from edited_manifests import edit_manifest
 from small_gearbox import pair_tables
 
-from femgear.errors import CaseError, StorageError
+from femgear.errors import CaseError, ConvergenceError, StorageError
 from femgear.findings import as_data
 from femgear.report import page as report_page
 from femgear.run import dynamic_model, mesh_stiffness, run_case, solve, stiffness_table
@@ -92,6 +92,37 @@ def test_numbers_are_told_before_anything_is_drawn(tmp_path, monkeypatch):
     with run_folder(tmp_path, case=case.source) as place:
         run_case(case, place, computed=computed)
     assert seen == [["deflection", "modes", "dynamics", "transient", "spectrum"], ["report.html"]]
+
+
+def test_a_verdict_comes_before_the_files_of_a_short_run(tmp_path):
+    case, there = quick("own_chain"), list[list[str]]()
+
+    def computed(results):
+        there.append(sorted(path.name for path in tmp_path.glob("*.nc")))
+        assert float(results.dynamics["mean_force"].max()) > 0.0
+
+    with run_folder(tmp_path, case=case.source) as place:
+        run_case(case, place, pictures=False, computed=computed)
+    written = read_manifest(tmp_path)
+    assert there == [[]] and written.complete
+    assert {f"{name}.nc" for name in written.timings} <= written.files.keys()
+
+
+def test_two_stages_at_once_are_those_one_after_the_other(tmp_path, monkeypatch):
+    case = with_values(quick("planetary_27_40_108"), {"static.stresses": True})
+    begun = run(case, tmp_path / "together", only="modes")
+    assert begun == ["static", "modes", "stress"]  # modes here, stresses in a copy of this process
+
+    def fail(stage, done, total):
+        if stage == "modes" and done:
+            raise ConvergenceError("no modes", code="E-RESONANCE")
+
+    with pytest.raises(ConvergenceError), run_folder(tmp_path / "out", case=case.source) as place:
+        run_case(case, place, only="modes", pictures=False, progress=fail)
+    monkeypatch.setattr("femgear.run.second_core", lambda: False)
+    assert run(case, tmp_path / "alone", only="modes") == ["static", "stress", "modes"]
+    together, alone, before = (contents(tmp_path / name) for name in ("together", "alone", "out"))
+    assert together == alone and before == {name: alone[name] for name in ("static.nc", "stress.nc")}
 
 
 def contents(folder):
