@@ -388,8 +388,9 @@ def run_case(
     Into a folder from `femgear.storage.results.run_folder`, whose manifest says what is there: stages are
     written after `_WORTH_KEEPING` seconds, when all are done, or when an error ends the run. Stages go up to
     ``only``, whatever the case says of it; ``pictures`` are figures, fields and report. ``progress`` is called
-    with (stage, done, total), ``computed`` with the results of all stages, before these are written and drawn. Returns the contents of the files, by stage, those that were written
-    part by part only where they were drawn or told.
+    with (stage, done, total), ``computed`` with the results of all stages, before these are written and drawn.
+    Returns the contents of the files, by stage, those that were written part by part only where they were
+    drawn or told.
     """
     requested, stages = _asked(case, only)
     run, results = _resumed(folder, requested, stages)
