@@ -110,8 +110,12 @@ def test_a_verdict_comes_before_the_files_of_a_short_run(tmp_path):
 
 def test_two_stages_at_once_are_those_one_after_the_other(tmp_path, monkeypatch):
     case = with_values(quick("planetary_27_40_108"), {"static.stresses": True})
-    begun = run(case, tmp_path / "together", only="modes")
-    assert begun == ["static", "modes", "stress"]  # modes here, stresses in a copy of this process
+
+    def stages(folder):
+        begun = run(case, tmp_path / folder, only="modes")
+        return [name for name in begun if name in ("static", "stress", "modes")]
+
+    assert stages("together") == ["static", "modes", "stress"]  # modes here, stresses in a copy of this process
 
     def fail(stage, done, total):
         if stage == "modes" and done:
@@ -120,7 +124,7 @@ def test_two_stages_at_once_are_those_one_after_the_other(tmp_path, monkeypatch)
     with pytest.raises(ConvergenceError), run_folder(tmp_path / "out", case=case.source) as place:
         run_case(case, place, only="modes", pictures=False, progress=fail)
     monkeypatch.setattr("femgear.run.second_core", lambda: False)
-    assert run(case, tmp_path / "alone", only="modes") == ["static", "stress", "modes"]
+    assert stages("alone") == ["static", "stress", "modes"]
     together, alone, before = (contents(tmp_path / name) for name in ("together", "alone", "out"))
     assert together == alone and before == {name: alone[name] for name in ("static.nc", "stress.nc")}
 
