@@ -75,7 +75,7 @@ class Bench:
         tell: Callable[[dict[str, Any]], None] = lambda progress: None,
     ) -> None:
         self.folder, self._cache, self._waiting, self._tell = folder, cache, waiting, tell
-        self._last_told = "", 0.0
+        self._last_told, self._titles = ("", 0.0), dict[str, str]()
         self._steps, self._seconds = Steps(), dict[str, float]()
         self._read: tuple[tuple[str, str], Any] | None = None
         self._latest = dict[str, tuple[Any, int]]()
@@ -125,6 +125,7 @@ class Bench:
     def _computing(self, step: str, done: float = 0.0, total: float = 1.0) -> None:
         """Tell what is computed where that is another step, and how far it is now and then; or give up."""
         self._go_on()
+        step = self._titles.get(step, step)
         former, at = self._last_told
         if step != former or time.perf_counter() - at > _TOLD_EVERY:
             self._last_told = step, time.perf_counter()
@@ -201,6 +202,7 @@ class Bench:
         check_case(case)
         train, of_run = train_of(case), {stage.name: stage for stage in stages_of(case)}
         answer = Answer(case, self._steps, cache=self._cache, progress=self._computing)
+        self._titles = {stage.name: stage.title for stage in train.stages}
         computed = dict[str, Any]()
         wanted = [of_run[key] for key in of_run if key in stages]
         taken = {name for stage in wanted for name in stage.before(case)}

@@ -102,7 +102,7 @@ def _field_of_new(name: str, label: str) -> Any:
     """Draw a field of a new case, whose mistake is forgotten as soon as it is changed."""
     if name == "kind":
         words = {kind: _KIND_WORDS[kind] for kind in KINDS}
-        return ui.select(words, value="planetary", label=label).classes("w-full")
+        return ui.select(words, value="planetary", label=label).classes("w-full col-span-2")
     if name == "treatment":
         field: Any = ui.select(["", *map(str, get_args(Treatment))], value=_FIRST[name], label=label).classes("w-full")
     else:

@@ -321,7 +321,7 @@ class Window:
             text += " Save it under another name, or take the saved file: it is not overwritten."
         else:
             text = f"{name} is open in another window, with changes that are not saved there."
-        self._elsewhere_text.text = text
+        self._elsewhere_text.text = text if self._elsewhere.visible else ""
         self._take.visible, self._stay.visible, self._back.visible = changed, changed and not saved, saved
         self._stay.text = "Keep what is here" if self.session.unsaved else "Stay with the saved file"
 

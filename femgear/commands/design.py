@@ -12,7 +12,7 @@ from cyclopts import Parameter
 
 from femgear.commands.files import write_case_file
 from femgear.commands.program import Quantity, Whole, app, examples, whole_number
-from femgear.commands.terminal import Progress, print_blocks, print_warnings, say, warning_lines
+from femgear.commands.terminal import Progress, print_blocks, print_warnings, say, says_when_long, warning_lines
 from femgear.study.teeth_request import TeethStrength, WantedTeeth
 
 
@@ -49,6 +49,7 @@ class ToothOptions:
         'femgear new pair -o pair.toml --teeth 17 40 --module "3 mm"',
     )
 )
+@says_when_long("case")
 def new(
     kind: str,
     /,
@@ -127,6 +128,7 @@ def teeth(
 
 
 @app.command
+@says_when_long("gearbox")
 def gearbox(
     case: Path,
     /,
@@ -163,6 +165,7 @@ def gearbox(
 
 
 @app.command
+@says_when_long("casing")
 def casing(
     case: Path,
     /,

@@ -14,12 +14,13 @@ from cyclopts import Parameter
 import femgear
 from femgear.commands.files import need_new_files, write_case_file
 from femgear.commands.program import Whole, app, examples
-from femgear.commands.terminal import Progress, print_warnings, say, warning_lines
+from femgear.commands.terminal import Progress, print_warnings, say, says_when_long, warning_lines
 from femgear.errors import CaseError, FemgearError, printable
 from femgear.exchange.sampling import Sampling
 
 
 @app.command(name="import")
+@says_when_long("import")
 def import_rexs(
     file: Path,
     /,
@@ -72,6 +73,7 @@ def import_rexs(
 
 
 @app.command
+@says_when_long("REXS")
 def rexs(
     case: Path,
     /,
@@ -105,6 +107,7 @@ def rexs(
 
 
 @app.command
+@says_when_long("solids")
 def cad(
     case: Path,
     /,

@@ -10,7 +10,7 @@ from cyclopts import Parameter
 
 from femgear.commands.files import write_case_file
 from femgear.commands.program import Tasks, app, examples
-from femgear.commands.terminal import Progress, print_blocks, say
+from femgear.commands.terminal import Progress, print_blocks, say, says_when_long
 from femgear.errors import CaseError
 from femgear.measured.requests import FurtherFiles, LineSearch, Recording
 from femgear.study.fault_request import FaultRequest, FurtherRecords
@@ -127,6 +127,7 @@ def faults(
 
 
 @app.command
+@says_when_long("recording")
 def rigs(
     name: str | None = None,
     signal: Path | None = None,

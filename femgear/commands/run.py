@@ -21,6 +21,7 @@ from femgear.commands.terminal import (
     print_warnings,
     room_of_warnings,
     say,
+    says_when_long,
     warning_lines,
 )
 from femgear.errors import CaseError, FemgearError
@@ -30,6 +31,7 @@ if TYPE_CHECKING:
 
 
 @app.command
+@says_when_long("check")
 def check(
     case: Path,
     /,
@@ -230,6 +232,7 @@ def _only_case() -> Path:
 
 
 @app.command
+@says_when_long("report")
 def report(
     folder: Path,
     /,
@@ -266,6 +269,7 @@ def report(
 
 
 @app.command
+@says_when_long("comparison")
 def compare(
     *runs: Path,
     output: Annotated[Path, Parameter(name=("--output", "-o"))],

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import contextlib
+import functools
 import os
 import sys
 import textwrap
 import threading
 import time
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from typing import Any
 
 from femgear.errors import printable
 
@@ -92,6 +94,29 @@ class Progress:
         if total > done > at_first and total > 1.0:
             text += f", about {(now - begun) * (total - done) / (done - at_first):.0f} s left"
         return text
+
+
+def says_when_long(words: str) -> Callable[[Callable[..., int]], Callable[..., int]]:
+    """Make a command without stages say what it does, as often as a reader would begin to wonder."""
+
+    def decorate(command: Callable[..., int]) -> Callable[..., int]:
+        @functools.wraps(command)
+        def telling(*arguments: Any, **named: Any) -> int:
+            ended, start = threading.Event(), time.monotonic()
+
+            def tell() -> None:
+                while not ended.wait(SILENCE):
+                    print(f"{words}, {time.monotonic() - start:.0f} s", file=sys.stderr, flush=True)
+
+            threading.Thread(target=tell, daemon=True).start()
+            try:
+                return command(*arguments, **named)
+            finally:
+                ended.set()
+
+        return telling
+
+    return decorate
 
 
 def print_blocks(blocks) -> None:

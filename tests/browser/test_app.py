@@ -354,6 +354,23 @@ def test_it_is_heard(window, serve, folder):
     assert audio.evaluate("(sound) => sound.loop && !sound.paused && sound.duration > 1")
 
 
+def test_a_pair_becomes_a_gearbox_in_a_casing(window, serve, tmp_path):
+    (tmp_path / "set.toml").write_text((CASES / "spur_pair.toml").read_text())
+    tab = window(serve(tmp_path))
+    field(tab, "title").wait_for()
+    for words, name, fold in (
+        ("As a gearbox", "set_gearbox", "shaft"),
+        ("In a casing", "set_gearbox_in_casing", "sensor"),
+    ):
+        press(tab, "Gearbox")
+        tab.get_by_text(words, exact=True).click()
+        tab.locator(".q-expansion-item .q-item__label", has_text=re.compile(rf"^{fold} \(\d\)$")).wait_for()
+        press(tab, "Save")
+        tab.get_by_text("saved", exact=True).wait_for()
+        assert tomllib.loads((tmp_path / f"{name}.toml").read_text())["model"] == "gearbox"
+    assert len(tomllib.loads((tmp_path / "set_gearbox_in_casing.toml").read_text())["sensor"]) >= 2
+
+
 def test_windows_do_not_mix(window, serve, folder):
     (folder / "other.toml").write_text(coarse_case().replace("100 N m", "60 N m"))
     server = serve(folder)

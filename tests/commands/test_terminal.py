@@ -1,7 +1,9 @@
 """femgear/commands/terminal.py: tables that fit, progress that is never silent."""
 
+import ast
 import re
 import time
+from pathlib import Path
 
 import pytest
 from command_stand_ins import Narrow
@@ -108,6 +110,34 @@ def test_progress_before_the_first_stage_has_a_name(monkeypatch, capsys):
     with terminal.Progress():
         time.sleep(0.2)
     assert set(capsys.readouterr().err.splitlines()) == {"working, 0 s"}
+
+
+def test_a_command_without_stages_says_what_it_does_when_it_is_long(monkeypatch, capsys):
+    monkeypatch.setattr(terminal, "SILENCE", 0.05)
+
+    @terminal.says_when_long("solids")
+    def slow(seconds: float, *, code: int = 0) -> int:
+        time.sleep(seconds)
+        return code
+
+    assert slow(0.3, code=4) == 4
+    lines = capsys.readouterr().err.splitlines()
+    assert len(lines) > 2 and set(lines) == {"solids, 0 s"}
+    slow(0.0)
+    time.sleep(0.2)
+    assert capsys.readouterr().err == ""
+
+
+def test_every_command_that_may_be_long_says_something():
+    """Servers, and commands that print what is stored, have nothing to wait for."""
+    silent, count = set[str](), 0
+    for path in Path(terminal.__file__).parent.glob("*.py"):
+        for function in ast.parse(path.read_text("utf-8")).body:
+            decorators = map(ast.unparse, getattr(function, "decorator_list", ()))
+            if any(text.startswith("app.command") for text in decorators):
+                text, count = ast.unparse(function), count + 1
+                silent |= set() if "says_when_long(" in text or "Progress()" in text else {function.name}
+    assert silent == {"explain", "schema", "skill", "mcp", "open_app"} and count > 20
 
 
 def test_a_run_is_told_in_few_lines_of_80_columns(monkeypatch, capsys):
