@@ -317,9 +317,9 @@ SAYS_NOTHING = {"found", "one", "own", "some", "told", "known", "asked", "heard"
 
 def test_variables_fields_and_parameters_say_what_they_hold():
     wrong = []
-    scripts = sorted((PACKAGE.parent / "scripts").rglob("*.py"))
-    assert len(scripts) > 40  # examples and published sets among them
-    for path in (*MODULES, *scripts):
+    scripts, programs = (sorted((PACKAGE.parent / folder).rglob("*.py")) for folder in ("scripts", "validation"))
+    assert len(scripts) > 40 and len(programs) > 150  # examples, published sets and references among them
+    for path in (*MODULES, *scripts, *programs):
         names = [(node.id, node) for node in of_kinds(path, ast.Name) if isinstance(node.ctx, ast.Store)]
         names += [(node.attr, node) for node in of_kinds(path, ast.Attribute) if isinstance(node.ctx, ast.Store)]
         names += [(node.arg, node) for node in of_kinds(path, ast.arg)]

@@ -49,9 +49,13 @@ def validate(
     from validation.themes import THEMES
 
     name = None if theme is None else theme.casefold()
-    chosen = tuple(one for one in THEMES if name in (None, one.name.casefold(), one.title.casefold()))
+    chosen = tuple(
+        listed_theme
+        for listed_theme in THEMES
+        if name in (None, listed_theme.name.casefold(), listed_theme.title.casefold())
+    )
     if not chosen:
-        raise _unknown_theme(theme, [one.name for one in THEMES])
+        raise _unknown_theme(theme, [known_theme.name for known_theme in THEMES])
     with one_blas_thread():  # sums of several threads differ in the last digits
         validation = run_validation(chosen, quick=quick, progress=progress)
     if output is not None:

@@ -146,8 +146,10 @@ def free_casing(size: float = SIZE, around: int = AROUND) -> tuple[np.ndarray, n
     frequencies = calculix.frequencies(calculix.run("\n".join(lines) + "\n").tables)
     # three nodes hold it without a force
     used = np.unique(solids)
-    one, two, three = (used[(points[used] @ np.array(way)).argmax()] + 1 for way in ((0, 0, 1), (0, 0, -1), (1, 0, 0)))
-    lines[-1] = f"*BOUNDARY\n{one},1,3\n{two},1,2\n{three},2,2"
+    first, two, three = (
+        used[(points[used] @ np.array(way)).argmax()] + 1 for way in ((0, 0, 1), (0, 0, -1), (1, 0, 0))
+    )
+    lines[-1] = f"*BOUNDARY\n{first},1,3\n{two},1,2\n{three},2,2"
     for load in loads:
         lines.append("*STEP\n*STATIC\n*CLOAD, OP=NEW")
         lines += [f"{i + 1},{c + 1},{1e6 * load[i, c]:.12g}" for i, c in np.argwhere(load)]

@@ -102,8 +102,8 @@ def rollers() -> tuple[Row, ...]:
     rows.append(within("18 rollers", "10/9 F / d", "s 0: stiffness [N/µm]", wanted, slope, 1e-9))
     rows += [row for state in states for row in _one_unknown(state)]
     slopes = [state.stiffness[0, 0] for state in loose]
-    text, own = "s 20 µm: variation of the stiffness as rollers pass", "the same formulas, written independently"
-    rows.append(within("18 rollers", own, text, 0.0100, float(np.ptp(slopes) / np.mean(slopes)), 0.05))
+    text, origin = "s 20 µm: variation of the stiffness as rollers pass", "the same formulas, written independently"
+    rows.append(within("18 rollers", origin, text, 0.0100, float(np.ptp(slopes) / np.mean(slopes)), 0.05))
     many = replace(TAPERED, rollers=101, pitch_diameter=0.4, profile="none")
     push = bearing_state(many, (25e-6, 0, 0, 0, 0, 0)).force
     ratio = push[2] / push[0] / math.tan(many.contact_angle)
@@ -233,9 +233,9 @@ def lives() -> tuple[Row, ...]:
 
 def orders() -> tuple[Row, ...]:
     """Passing orders of a bearing whose faults are measured everywhere."""
-    found = passing_orders(BallBearing(9, 0.3126 * 25.4e-3, 1.537 * 25.4e-3))
+    orders = passing_orders(BallBearing(9, 0.3126 * 25.4e-3, 1.537 * 25.4e-3))
     source = "Case Western Reserve University, bearing data center, 6205"
-    values = ((0.39828, found.cage), (3.5848, found.outer), (5.4152, found.inner), (4.7135, 2.0 * found.spin))
+    values = ((0.39828, orders.cage), (3.5848, orders.outer), (5.4152, orders.inner), (4.7135, 2.0 * orders.spin))
     names = ("cage", "outer ring", "inner ring", "ball, both rings")
     return tuple(
         within("6205", source, f"{name}, per turn", *pair, 2e-4, note="diameters have four digits")

@@ -39,7 +39,7 @@ class _AtRest:
 
     Parameters
     ----------
-    found : Deflection
+    state : Deflection
         Loaded state.
     running : RunningSet
         Its planets.
@@ -47,19 +47,19 @@ class _AtRest:
         Without planets and their meshes.
     motions : (6n, k) array
         Of all stations by all coordinates.
-    own : int
+    coordinates : int
         Number of coordinates of the structure.
     """
 
-    found: Deflection
+    state: Deflection
     running: RunningSet
     structure: MechanicalSystem
     motions: np.ndarray
-    own: int
+    coordinates: int
 
     def matrices(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Mass, damping and stiffness (k, k) of structure and planets without their meshes and bearings."""
-        assembly, planets = self.found.model.assembly, planet_stations(self.found, self.running)
+        assembly, planets = self.state.model.assembly, planet_stations(self.state, self.running)
         mass, damping, stiffness = np.zeros((3, assembly.count, assembly.count))
         for inertia in assembly.inertias:
             if planets.issuperset(inertia.stations):
@@ -71,16 +71,16 @@ class _AtRest:
                 at = _motions_of(beam.stations)
                 stiffness[np.ix_(at, at)] += beam.stiffness
         mass, damping, stiffness = (self.motions.T @ matrix @ self.motions for matrix in (mass, damping, stiffness))
-        inner = np.s_[: self.own, : self.own]
+        inner = np.s_[: self.coordinates, : self.coordinates]
         mass[inner] += self.structure.M
         damping[inner] += BY_MASS * self.structure.M + BY_STIFFNESS * self.structure.K
         stiffness[inner] += self.structure.K
         return mass, damping, stiffness
 
 
-def planet_stations(found: Deflection, running: RunningSet) -> set[int]:
+def planet_stations(state: Deflection, running: RunningSet) -> set[int]:
     """Stations of all planets, two of each."""
-    first = (found.model.first[planet] for branch in running.branches for planet in branch.planets)
+    first = (state.model.first[planet] for branch in running.branches for planet in branch.planets)
     return {start + end for start in first for end in (0, 1)}
 
 
@@ -90,27 +90,27 @@ def _motions_of(stations: tuple[int, ...]) -> np.ndarray:
 
 def set_at_rest(*, back: bool) -> _AtRest:
     """Solve the set for its loaded state and take its planets out of the structure."""
-    found = solve_deflection(read_case(bending_set(ANGLE, back=back)))
-    (running,) = running_sets(found.model.case)
-    planets, assembly = planet_stations(found, running), found.model.assembly
+    state = solve_deflection(read_case(bending_set(ANGLE, back=back)))
+    (running,) = running_sets(state.model.case)
+    planets, assembly = planet_stations(state, running), state.model.assembly
     rest, structure, _ = structure_apart(
-        found, planets, {mesh for stage in found.model.stages for mesh in stage.meshes}
+        state, planets, {mesh for stage in state.model.stages for mesh in stage.meshes}
     )
     moving = _motions_of(tuple(sorted(planets)))
     motions = np.zeros((assembly.count, rest.motions.shape[1] + len(moving)))
     motions[:, : -len(moving)] = rest.motions
     motions[moving, -len(moving) + np.arange(len(moving))] = 1.0
-    return _AtRest(found, running, structure, motions, rest.motions.shape[1])
+    return _AtRest(state, running, structure, motions, rest.motions.shape[1])
 
 
 def _turning_rows(
-    found: Deflection, running: RunningSet, first: str, sense: int, *, back: bool
+    state: Deflection, running: RunningSet, first: str, sense: int, *, back: bool
 ) -> Callable[[float], np.ndarray]:
     """Approaches of the meshes with a member, then of all others, then of bearings, where the carrier has turned.
 
     Per unit of all motions.
     """
-    model = found.model
+    model = state.model
     meshes = [
         stage.meshes[0] for stage in sorted(model.stages, key=lambda stage: (first not in stage.name, stage.name))
     ]
@@ -139,26 +139,26 @@ def turning_set(member: str, *, back: bool) -> tuple[TurningSystem, RunningStage
     And the modes (m, k) of the structure by its coordinates.
     """
     at_rest = set_at_rest(back=back)
-    found, running, model = at_rest.found, at_rest.running, at_rest.found.model
+    state, running, model = at_rest.state, at_rest.running, at_rest.state.model
     kind = next(number for number, names in enumerate(running.kinds) if member in names[0])
     excitations = {stage.name: pair_count_excitation(model, stage) for stage in model.stages}
-    structured, _ = branch_stage(found, running, kind, excitations, pair_phases(model.case, model.flow))
+    structured, _ = branch_stage(state, running, kind, excitations, pair_phases(model.case, model.flow))
     stage, frequency = structured.running, structured.running.natural_frequency
     # the excited meshes, the others, then bearings
     viscous = np.where(np.arange(len(stage.stiffness)) < 2, 0.0, TIME_CONSTANT * stage.stiffness)
     ratio = 0.5 * (BY_MASS / frequency + BY_STIFFNESS * frequency)
     undamped = {"loss": 0.0 * stage.loss, "structure_loss": 0.0}
     stage = replace(stage, damping_ratio=ratio, viscous=viscous, **undamped)
-    bearings = np.concatenate([np.diag(found.bearing_stiffness[n]) for numbers in running.pins for n in numbers])
+    bearings = np.concatenate([np.diag(state.bearing_stiffness[n]) for numbers in running.pins for n in numbers])
     springs = np.append(np.full(3, stage.stiffness[1]), bearings)
     dampers = TIME_CONSTANT * np.append(np.zeros(3), bearings)
     speed = abs(model.flow.speed["carrier"])
     teeth = round(2.0 * math.pi * model.flow.mesh_frequency[f"{member} 0"] / speed)
-    rows, drive = _turning_rows(found, running, member, stage.sense, back=back), stage.excitation
+    rows, drive = _turning_rows(state, running, member, stage.sense, back=back), stage.excitation
     turning = TurningSystem(
         lambda turn: rows(turn) @ at_rest.motions, *at_rest.matrices(), springs, dampers, drive, teeth, speed, 2
     )
-    shape = np.linalg.lstsq(at_rest.motions[:, : at_rest.own], structured.motion, rcond=None)[0]
+    shape = np.linalg.lstsq(at_rest.motions[:, : at_rest.coordinates], structured.motion, rcond=None)[0]
     return turning, stage, shape.T
 
 
@@ -208,35 +208,37 @@ class _MeshesInTime:
 
 def parting_set(*, back: bool) -> tuple[Deflection, RunningSet, NonlinearGearbox]:
     """Loaded state of the set, its planets, and the set with flanks that wave so much that they part."""
-    found = solve_deflection(read_case(bending_set(ANGLE, back=back)))
-    excitations = {stage.name: pair_count_excitation(found.model, stage) for stage in found.model.stages}
+    state = solve_deflection(read_case(bending_set(ANGLE, back=back)))
+    excitations = {stage.name: pair_count_excitation(state.model, stage) for stage in state.model.stages}
     for name, record in excitations.items():
         theta = 2.0 * math.pi * np.arange(record.stiffness.shape[1]) / record.stiffness.shape[1]
         excitations[name] = replace(record, deflection=record.deflection + 1.4e-5 * np.cos(theta))
-    (running,) = running_sets(found.model.case)
-    return found, running, nonlinear_gearbox(found, excitations, harmonics=2, damping_ratio=0.0)
+    (running,) = running_sets(state.model.case)
+    return state, running, nonlinear_gearbox(state, excitations, harmonics=2, damping_ratio=0.0)
 
 
 def apart_at_rest(*, back: bool) -> tuple[float, float]:
     """Difference of the motion in axes at rest over the motion, and share of time in which flanks are apart."""
-    found, running, box = parting_set(back=back)
-    model, planets, (assembly, _, _) = found.model, planet_stations(found, running), linear_system(found)
+    deflected, running, box = parting_set(back=back)
+    model, planets, (assembly, _, _) = deflected.model, planet_stations(deflected, running), linear_system(deflected)
     T, speed, system = box.motion, model.flow.speed["carrier"], box.problem.system
     around = turning_planets(model, model.stages)["sun 0"]
-    own = replace(assembly, inertias=tuple(one for one in assembly.inertias if planets.issuperset(one.stations)))
-    pull = T.T @ centrifugal_pull(assembly, around, own.mass) @ T
+    of_planets = replace(
+        assembly, inertias=tuple(inertia for inertia in assembly.inertias if planets.issuperset(inertia.stations))
+    )
+    pull = T.T @ centrifugal_pull(assembly, around, of_planets.mass) @ T
     still = np.array([not name.startswith("p") for name in system.dofs])
     damping = BY_MASS * np.where(still[:, None] & still, system.M, 0.0)
     problem = replace(box.problem, system=replace(system, K=system.K - pull, C=system.C + damping))
-    start = np.linalg.lstsq(T, found.motion, rcond=None)[0]
+    start = np.linalg.lstsq(T, deflected.motion, rcond=None)[0]
     times = np.linspace(0.0, 0.05 * 2.0 * math.pi / abs(speed), 200)
-    known = {"start": (start, 0.0 * start), "method": "DOP853", "tolerance": 1e-10}
-    motion = solve_transient(problem, box.frequency, times, **known).displacement.T
-    springs = tuple(one for one in assembly.springs if planets.isdisjoint(one.stations))
+    options = {"start": (start, 0.0 * start), "method": "DOP853", "tolerance": 1e-10}
+    motion = solve_transient(problem, box.frequency, times, **options).displacement.T
+    springs = tuple(spring for spring in assembly.springs if planets.isdisjoint(spring.stations))
     C, K = damping + T.T @ assembly.gyroscopic @ T, T.T @ replace(assembly, springs=springs).stiffness @ T
     inverse, load = np.linalg.inv(T.T @ assembly.mass @ T), T.T @ model.load
-    bearings = np.concatenate([np.diag(found.bearing_stiffness[n]) for numbers in running.pins for n in numbers])
-    meshes = _meshes_in_time(found, running, box, back=back)
+    bearings = np.concatenate([np.diag(deflected.bearing_stiffness[n]) for numbers in running.pins for n in numbers])
+    meshes = _meshes_in_time(deflected, running, box, back=back)
 
     def rate(time: float, state: np.ndarray) -> np.ndarray:
         q, v = np.split(state, 2)
@@ -252,10 +254,10 @@ def apart_at_rest(*, back: bool) -> tuple[float, float]:
     return float(apart), float(np.mean(np.equal(forces, 0.0)))
 
 
-def _meshes_in_time(found: Deflection, running: RunningSet, box: NonlinearGearbox, *, back: bool) -> _MeshesInTime:
+def _meshes_in_time(state: Deflection, running: RunningSet, box: NonlinearGearbox, *, back: bool) -> _MeshesInTime:
     """Meshes of the set, those of the sun first, by the coordinates of the nonlinear gearbox."""
-    speed = found.model.flow.speed["carrier"]
-    rows = _turning_rows(found, running, "sun", 1 if speed > 0.0 else -1, back=back)
+    speed = state.model.flow.speed["carrier"]
+    rows = _turning_rows(state, running, "sun", 1 if speed > 0.0 else -1, back=back)
     a, b, c = (rows(angle) @ box.motion for angle in (0.0, 0.5 * math.pi, math.pi))
     mean, records = 0.5 * (a + c), [stage.excitation for stage in box.stages]
     lines = [

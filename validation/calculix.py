@@ -80,34 +80,34 @@ def run(text: str) -> Output:
 
 def tables(text: str, title: str) -> list[np.ndarray]:
     """Read all tables whose title begins so, one a step, rows of numbers each."""
-    found, rows = [], None
+    tables, rows = [], None
     for line in text.splitlines():
         if re.match(r" *[a-zA-Z]", line):
             rows = None
             if line.strip().startswith(title):
                 rows = []
-                found.append(rows)
+                tables.append(rows)
         elif rows is not None and line.strip():
             # exponents of three digits stand without their letter
             rows.append([float(cell) for cell in re.sub(r"(\d)([+-]\d{3})\b", r"\1E\2", line).split()])
-    return [np.array(rows) for rows in found]
+    return [np.array(rows) for rows in tables]
 
 
 def fields(text: str, name: str) -> list[tuple[np.ndarray, np.ndarray]]:
     """Read all fields of a name, such as ``"STRESS"``, one a step: numbers of nodes and components."""
-    found, nodes, values = [], None, None
+    blocks, nodes, values = [], None, None
     for line in text.splitlines():
         if line.startswith(" -4"):
             nodes = values = None
             if line.split()[1] == name:
                 nodes, values = [], []
-                found.append((nodes, values))
+                blocks.append((nodes, values))
         elif line.startswith(" -1") and nodes is not None:
             nodes.append(int(line[3:13]))
             values.append([float(line[i : i + 12]) for i in range(13, len(line.rstrip()), 12)])
         elif line.startswith(" -3"):
             nodes = None
-    return [(np.array(numbers), np.array(rows)) for numbers, rows in found]
+    return [(np.array(numbers), np.array(rows)) for numbers, rows in blocks]
 
 
 @dataclass(frozen=True)
@@ -479,8 +479,8 @@ def natural_frequencies(
 
 def frequencies(text: str) -> np.ndarray:
     """Read the natural frequencies [Hz]."""
-    found = re.findall(r"^ +\d+((?: +[-+.E0-9]+){4}) *$", text, flags=re.MULTILINE)
-    return np.array([float(row.split()[2]) for row in found])
+    numbers = re.findall(r"^ +\d+((?: +[-+.E0-9]+){4}) *$", text, flags=re.MULTILINE)
+    return np.array([float(row.split()[2]) for row in numbers])
 
 
 @dataclass(frozen=True)
@@ -553,7 +553,7 @@ def pair_contact(
         roots.append(node + 1 + np.unique(fillets))
         chains = [np.unique(body.edges[f"flank {pair.teeth[number - 1]}"]) for pair in mates]
         flanks.append([(node + 1 + chain, body.points[chain]) for chain in chains])
-        shown = np.concatenate([roots[-1], *(own for own, _ in flanks[-1])])
+        shown = np.concatenate([roots[-1], *(flank_nodes for flank_nodes, _ in flanks[-1])])
         lines += ["*NSET, NSET=SHOWN", *map(str, shown)]
         rim = node + 1 + np.unique(body.edges["rim"])
         lines += [f"*NSET, NSET=RIM{number}", *map(str, rim)]
@@ -581,8 +581,8 @@ def pair_contact(
     for numbers, values in fields(output.fields, "STRESS"):
         stress = np.full((node + 1, 2), np.nan)
         stress[numbers] = 1e6 * _principal(values)
-        roots_found.append([stress[own, 1].max() for own in roots])
-        pressure.append([[_peak(points, -stress[own, 0]) for own, points in chains] for chains in flanks])
+        roots_found.append([stress[nodes_of_root, 1].max() for nodes_of_root in roots])
+        pressure.append([[_peak(points, -stress[nodes, 0]) for nodes, points in chains] for chains in flanks])
     return PairContact(
         np.array(approach),
         np.array(torque[1:]),

@@ -93,7 +93,7 @@ def bore_load(points: np.ndarray, triangles: np.ndarray, place: float, ring_poin
     shapes = np.array([r * (2 * r - 1), s * (2 * s - 1), t * (2 * t - 1), 4 * r * s, 4 * s * t, 4 * t * r])
     by_s = np.array([1 - 4 * r, 4 * s - 1, 0 * s, 4 * (r - s), 4 * t, -4 * t])
     by_t = np.array([1 - 4 * r, 0 * s, 4 * t - 1, -4 * s, 4 * s, 4 * (r - t)])
-    x, along, across = (np.einsum("kq,ekd->eqd", one, points[inner]) for one in (shapes, by_s, by_t))
+    x, along, across = (np.einsum("kq,ekd->eqd", weights, points[inner]) for weights in (shapes, by_s, by_t))
     area = np.linalg.norm(np.cross(along, across), axis=2) * 0.5 / len(s)
     weight = hats(np.arctan2(x[..., 1], x[..., 0]), ring_points) * area
     weight /= weight.sum(axis=(1, 2), keepdims=True)

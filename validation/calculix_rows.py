@@ -113,13 +113,13 @@ def femgear_pair(name: str) -> tuple[Case, StaticResult, np.ndarray]:
     case = pair_case(PAIRS[name], 64)
     static = solve_static(case)
     cycle, stress = static.cycle, solve_stress(case, static)
-    found = (
+    sharing = (
         1e6 * cycle.deflection[0],
         1e-6 * cycle.stiffness[0],
         1e-6 * cycle.max_pressure[0],
         *(1e-6 * root.stress[:, :, 0].max(axis=(0, 2)) for root in stress.roots),
     )
-    return case, static, np.array(found)
+    return case, static, np.array(sharing)
 
 
 @cache
@@ -158,8 +158,10 @@ def pair_rows(name: str) -> tuple[Row, ...]:
     """Compare a pair at eight positions: approach, tangent stiffness, pressure and roots."""
     rows, ours = list[Row](), femgear_pair(name)[2]
     for position in POSITIONS:
-        found = ours[:, round(64 * position)]
-        for quantity, gate, theirs, value in zip(QUANTITIES, GATES, expected(name, position), found, strict=True):
+        positions_of_ours = ours[:, round(64 * position)]
+        for quantity, gate, theirs, value in zip(
+            QUANTITIES, GATES, expected(name, position), positions_of_ours, strict=True
+        ):
             tilt = TILT.get((name, position))
             reason = "" if tilt is None else CORNER.format(tilt=tilt)
             if name == "24/-60" and quantity == ROOT_2:
@@ -301,7 +303,9 @@ def ring_on_feet() -> tuple[Row, ...]:
     case, rows = reference_case(), list[Row]()
     gear = reference_static().planetary_set.ring
     grid = whole_grid(gear)
-    teeth = np.concatenate([own for name, own in grid.regions.items() if name.startswith("tooth")])
+    teeth = np.concatenate(
+        [tooth_elements for name, tooth_elements in grid.regions.items() if name.startswith("tooth")]
+    )
     body = calculix.PlaneBody(
         grid.points, grid.triangles, grid.boundaries, np.isin(np.arange(len(grid.triangles)), teeth)
     )
@@ -322,8 +326,8 @@ def ring_on_feet() -> tuple[Row, ...]:
             masses=masses if mass else {},
             count=MODES,
         )
-        found = fixed_housing.ring_on_feet(stiffness, mass)
+        casing = fixed_housing.ring_on_feet(stiffness, mass)
         for i, reference in enumerate(expected[:MODES]):
             words = f"four feet of {stiffness:.0e} N/m, {1e3 * mass:g} g: natural frequency {i + 1} [Hz]"
-            rows.append(within("feet", SOURCE, words, reference, found[i], 0.002))
+            rows.append(within("feet", SOURCE, words, reference, casing[i], 0.002))
     return tuple(rows)

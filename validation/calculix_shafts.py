@@ -204,11 +204,11 @@ def round_solid(shaft: Shaft) -> RoundSolid:
                         angle = 2.0 * math.pi * (sector + v) / SECTORS
                         row.append(node(near + w * (far - near), angle, a + w * (b - a)))
                     elements[len(row)].append(row)
-    found = np.array(places)
+    coordinates = np.array(places)
     hexahedra = np.array(elements[20], int).reshape(-1, 20)
     wedges = np.array(elements[15], int).reshape(-1, 15)
-    means = {place: section_means(found, hexahedra, wedges, place) for place in shaft.stations}
-    return RoundSolid(found, hexahedra, wedges, means)
+    means = {place: section_means(coordinates, hexahedra, wedges, place) for place in shaft.stations}
+    return RoundSolid(coordinates, hexahedra, wedges, means)
 
 
 def _shapes(corners: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

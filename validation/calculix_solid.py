@@ -175,8 +175,8 @@ def solid_contact(
 
 def contact_moments(text: str) -> np.ndarray:
     """Read the moments about z of all contact surfaces, in the order of the tables [N mm]."""
-    found = re.findall(r"total surface force[^\n]*\n\s*([^\n]+)\n", text)
-    return np.array([float(row.split()[5]) for row in found])
+    forces = re.findall(r"total surface force[^\n]*\n\s*([^\n]+)\n", text)
+    return np.array([float(row.split()[5]) for row in forces])
 
 
 def over_width(case: Case) -> tuple[np.ndarray, np.ndarray]:
@@ -218,11 +218,11 @@ def face_load() -> tuple[Row, ...]:
     """Load over the width of one tooth pair under a lead slope, in three dimensions between mirror planes."""
     from femgear.trains.reading import parse_case
 
-    expected, found = over_width(parse_case(CASE, name="wide pair"))
+    expected, record = over_width(parse_case(CASE, name="wide pair"))
     name = f"24/36, lead slope of {SLOPE:g} um, {LAYERS} layers of wedges between mirror planes: "
     note = f"mean load of a layer; femgear has {SLICES} slices"
-    rows = [within("width", SOURCE, name + "K_Hbeta", expected.max(), found.max(), GATE, note=note)]
-    for i, (theirs, ours) in enumerate(zip(expected, found, strict=True)):
+    rows = [within("width", SOURCE, name + "K_Hbeta", expected.max(), record.max(), GATE, note=note)]
+    for i, (theirs, ours) in enumerate(zip(expected, record, strict=True)):
         text = f"{name}load of layer {i + 1} over the mean"
         rows.append(within("width", SOURCE, text, theirs, ours, 2 * GATE))
     return tuple(rows)

@@ -45,9 +45,9 @@ TIE, INNER, COMPARED = 5e9, 60, 12
 """Stiffness between a meshed surface and its node [N/m], inner modes of the reduction, elastic modes compared."""
 
 
-def _apart(found, expected) -> float:
+def _apart(computed, expected) -> float:
     """Largest difference over the largest value."""
-    return float(np.abs(np.subtract(found, expected)).max() / np.abs(expected).max())
+    return float(np.abs(np.subtract(computed, expected)).max() / np.abs(expected).max())
 
 
 def _solved(tables: dict[str, Any], folder: str | None = None) -> Deflection:
@@ -59,9 +59,9 @@ def _solved(tables: dict[str, Any], folder: str | None = None) -> Deflection:
     return solve_deflection(read_case(str(path)))
 
 
-def _frequencies(found: Deflection) -> np.ndarray:
+def _frequencies(state: Deflection) -> np.ndarray:
     """Elastic natural frequencies [Hz]."""
-    frequency = solve_gearbox_modes(found).modes.frequency
+    frequency = solve_gearbox_modes(state).modes.frequency
     return frequency[frequency > 0.0]
 
 
@@ -110,15 +110,15 @@ def on_feet() -> tuple[Row, ...]:
 def _written_out() -> list[Row]:
     """Two rigid gears in a rigid casing against their matrices."""
     mass, stiffness, load = rigid_matrices()
-    found, name = _solved(rigid_tables()), "two rigid gears, casing"
+    state, name = _solved(rigid_tables()), "two rigid gears, casing"
     free = np.setdiff1d(np.arange(18), [5])
     motion = np.zeros(18)
     motion[free] = np.linalg.solve(stiffness[np.ix_(free, free)], load[free])
     square = eigh(stiffness, mass, eigvals_only=True)[1:]
     expected = np.sqrt(square) / (2.0 * np.pi)
     rows = [
-        at_most(name, WRITTEN, "motion at the load, relative", LARGEST, _apart(found.motion, motion)),
-        at_most(name, WRITTEN, "natural frequencies, relative", LARGEST, _apart(_frequencies(found), expected)),
+        at_most(name, WRITTEN, "motion at the load, relative", LARGEST, _apart(state.motion, motion)),
+        at_most(name, WRITTEN, "natural frequencies, relative", LARGEST, _apart(_frequencies(state), expected)),
     ]
     tables = rigid_tables()
     for bearing in tables["bearing"]:
@@ -130,8 +130,8 @@ def _written_out() -> list[Row]:
     k, inertia = 4.0 * np.array(STIFFNESS), np.diag(TENSOR)
     alone = np.append(k / MASS, 0.1**2 * (k.sum() - k) / inertia)
     modes = solve_gearbox_modes(_solved(tables)).modes
-    own = [hertz for hertz, kind in zip(modes.frequency, modes.kind, strict=True) if kind == "casing"]
-    worst = _apart(own, np.sort(np.sqrt(alone)) / (2.0 * np.pi)) if len(own) == 6 else math.inf
+    casing_modes = [hertz for hertz, kind in zip(modes.frequency, modes.kind, strict=True) if kind == "casing"]
+    worst = _apart(casing_modes, np.sort(np.sqrt(alone)) / (2.0 * np.pi)) if len(casing_modes) == 6 else math.inf
     rows.append(at_most("casing on its feet", "sqrt(k/m)", "six natural frequencies, relative", 1e-7, worst))
     return rows
 
@@ -142,27 +142,35 @@ def of_files() -> tuple[Row, ...]:
     with TemporaryDirectory() as folder:
         paths = casing_paths([1e18] * 6, [1e18] * 3)
         rigid = _solved(_whole_body(paths))
-        found = _solved(_of_file(folder, paths), folder)
+        state = _solved(_of_file(folder, paths), folder)
         name, source = "file of a rigid body", "the rigid casing"
         rows.append(
-            at_most(name, source, "forces of feet, relative", LARGEST, _apart(found.foot_force, rigid.foot_force))
+            at_most(name, source, "forces of feet, relative", LARGEST, _apart(state.foot_force, rigid.foot_force))
         )
-        worst = _apart(_frequencies(found), _frequencies(rigid))
+        worst = _apart(_frequencies(state), _frequencies(rigid))
         rows.append(at_most(name, source, "natural frequencies, relative", LARGEST, worst))
     with TemporaryDirectory() as folder:
         paths = casing_paths(SEAT, FOOT)
-        found = _solved(_of_file(folder, paths), folder)
+        state = _solved(_of_file(folder, paths), folder)
         springs = _solved(_springs_in_series())
         name, source = "file of elastic paths", "springs in series"
         rows.append(
-            at_most(name, source, "forces of feet, relative", LARGEST, _apart(found.foot_force, springs.foot_force))
+            at_most(name, source, "forces of feet, relative", LARGEST, _apart(state.foot_force, springs.foot_force))
         )
-        worst = _apart(found.motion[:12], springs.motion[:12])
+        worst = _apart(state.motion[:12], springs.motion[:12])
         rows.append(at_most(name, source, "motions of the gears, relative", LARGEST, worst))
         stiffness, mass = _system(*body_matrices_of(paths), 6)
         expected = np.sqrt(eigh(stiffness, mass, eigvals_only=True)[1:]) / (2.0 * np.pi)
-        own = _frequencies(found)
-        rows.append(at_most(name, WRITTEN, "natural frequencies, relative", LARGEST, _apart(own, expected[: len(own)])))
+        frequencies = _frequencies(state)
+        rows.append(
+            at_most(
+                name,
+                WRITTEN,
+                "natural frequencies, relative",
+                LARGEST,
+                _apart(frequencies, expected[: len(frequencies)]),
+            )
+        )
     return tuple(rows)
 
 
@@ -257,20 +265,22 @@ def meshed() -> tuple[Row, ...]:
         lines = (Path(folder) / "nodes.csv").read_text(encoding="utf-8").splitlines()
         # the inner modes are of no node
         (Path(folder) / "nodes.csv").write_text("\n".join([lines[0], *lines[2:]]), encoding="utf-8")
-        found = _solved(tables, folder)
-        own = _frequencies(found)[:COMPARED]
+        state = _solved(tables, folder)
+        frequencies = _frequencies(state)[:COMPARED]
     feet = -motion[-12:].reshape(4, 3) * np.array(STIFFNESS)
     name, source = "meshed casing with ring", f"all {size} coordinates of the finite elements"
     return (
-        information(name, "a casing that stands still", "lowest natural frequency [Hz]", _lowest_without(), own[0]),
-        at_most(name, source, "motions of the gears, relative", 1e-7, _apart(found.motion[:12], motion[:12])),
-        at_most(name, source, "forces of feet, relative", 1e-7, _apart(found.foot_force, feet)),
+        information(
+            name, "a casing that stands still", "lowest natural frequency [Hz]", _lowest_without(), frequencies[0]
+        ),
+        at_most(name, source, "motions of the gears, relative", 1e-7, _apart(state.motion[:12], motion[:12])),
+        at_most(name, source, "forces of feet, relative", 1e-7, _apart(state.foot_force, feet)),
         at_most(
             name,
             source,
             f"first {COMPARED} natural frequencies with {INNER} inner modes, relative",
             1e-3,
-            float(np.abs(own / expected - 1.0).max()),
+            float(np.abs(frequencies / expected - 1.0).max()),
         ),
     )
 

@@ -25,9 +25,11 @@ def _box(stage: str, play: str, *, weight: bool) -> NonlinearGearbox:
     tables = chain_tables(play, [stage])
     if not weight:
         del tables["gravity"]
-    found = solve_deflection(read_case(tables))
-    drive = excitation_of(found, next(one for one in found.model.stages if one.name == stage))
-    return nonlinear_gearbox(found, {stage: drive}, harmonics=3)
+    state = solve_deflection(read_case(tables))
+    drive = excitation_of(
+        state, next(running_stage for running_stage in state.model.stages if running_stage.name == stage)
+    )
+    return nonlinear_gearbox(state, {stage: drive}, harmonics=3)
 
 
 def sensor_lines(stage: str, play: str, *, weight: bool) -> tuple[np.ndarray, np.ndarray]:

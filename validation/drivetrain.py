@@ -135,12 +135,12 @@ def former_modes() -> tuple[Row, ...]:
     """Natural frequencies of the shipped cases beside those of the train that had them before."""
     rows, former = list[Row](), numbers()
     wind = read_case("cases/wind_turbine_drivetrain.toml")
-    entries = [(name, read_case(f"cases/{name}.toml"), one["frequency"]) for name, one in former["cases"].items()]
+    entries = [(name, read_case(f"cases/{name}.toml"), entry["frequency"]) for name, entry in former["cases"].items()]
     entries.append(("held axes", wind.model_copy(update={"motions": "rotation"}), former["torsional"]))
     for name, case, wanted in entries:
-        found, expected = solve_gearbox_modes(solve_deflection(case)).modes.frequency, np.array(wanted)
-        rows.append(counted(name, FORMER, "modes", len(expected), len(found)))
-        error = np.abs(found - expected).max() / expected.max()
+        frequencies, expected = solve_gearbox_modes(solve_deflection(case)).modes.frequency, np.array(wanted)
+        rows.append(counted(name, FORMER, "modes", len(expected), len(frequencies)))
+        error = np.abs(frequencies - expected).max() / expected.max()
         rows.append(at_most(name, FORMER, "natural frequencies, largest difference over the highest", 1e-9, error))
     return tuple(rows)
 
@@ -178,8 +178,8 @@ def changed(wanted: dict[str, Any]) -> Any:
 def former_spectra() -> tuple[Row, ...]:
     """Named lines of the mesh forces over the whole run beside those of the former train."""
     rows = list[Row]()
-    for name, one in numbers()["cases"].items():
-        if (wanted := one.get("spectrum")) is None:
+    for name, entry in numbers()["cases"].items():
+        if (wanted := entry.get("spectrum")) is None:
             continue
         case = read_case(f"cases/{name}.toml")
         spectrum = solve_box_spectrum(case, former_motions(case))
@@ -197,8 +197,8 @@ def former_motions(case: GearboxCase) -> TransientResult:
     """Motions of a case damped as the former train was: by modes with the planets where they stand at the start."""
     state, motions = solve_deflection(case), {}
     for variant in (ALL_MOTIONS, TORSIONAL) if case.transient.torsional else (ALL_MOTIONS,):
-        found = state if variant == ALL_MOTIONS else torsional_state(state)
-        former = gearbox_in_time(found, case.transient, mean_damping=False)
+        chosen_state = state if variant == ALL_MOTIONS else torsional_state(state)
+        former = gearbox_in_time(chosen_state, case.transient, mean_damping=False)
         motions[variant] = integrate(former, every=run_outline(case).every)
     return TransientResult(motions, 0.0)
 
@@ -213,8 +213,8 @@ def general_integrator() -> tuple[Row, ...]:
     model = gearbox_in_time(solve_deflection(case), transient)
     motion = integrate(model, lowpass=False)
     times, problem = motion.run.time, model.box.problem
-    known = {"method": "average acceleration", "step": 1.0 / rate, "tolerance": 1e-12}
-    other = solve_transient(problem, model.box.frequency, times, **known)
+    options = {"method": "average acceleration", "step": 1.0 / rate, "tolerance": 1e-12}
+    other = solve_transient(problem, model.box.frequency, times, **options)
     rotations = np.array([model.rotation(shaft) for shaft in motion.shafts])
     spin = rotations @ model.spun.spin
     wanted = other.displacement @ rotations.T
@@ -277,12 +277,12 @@ def growth() -> tuple[Row, ...]:
     def rate(t, y):
         return [y[2], y[3], *(-(1.0 + share * math.cos(2.0 * t)) * y[:2])]
 
-    found = solve_ivp(rate, (0.0, math.pi), [1.0, 0.0, 0.0, 1.0], method="DOP853", rtol=1e-11, atol=1e-12)
-    largest = np.abs(np.linalg.eigvals(found.y[:, -1].reshape(2, 2))).max()
+    path = solve_ivp(rate, (0.0, math.pi), [1.0, 0.0, 0.0, 1.0], method="DOP853", rtol=1e-11, atol=1e-12)
+    largest = np.abs(np.linalg.eigvals(path.y[:, -1].reshape(2, 2))).max()
     wanted = math.log(largest) / math.pi * natural
     period = math.pi / natural
-    known = {"duration": 150 * period, "step": period / 200, "speed": 2.0 * natural / TEETH, "start": "zero"}
-    run = march_flanks(wheels.spun, **known)
+    options = {"duration": 150 * period, "step": period / 200, "speed": 2.0 * natural / TEETH, "start": "zero"}
+    run = march_flanks(wheels.spun, **options)
     text = "free motion of one mesh at twice its natural frequency, 200 steps a period: growth [1/s]"
     return (within("growth", "Mathieu's equation by DOP853", text, wanted, run.growth, 1e-3),)
 
@@ -298,8 +298,8 @@ def contact_loss() -> tuple[Row, ...]:
     column = wheels.spun.system.W[:, 0]
     start = np.zeros(2), -speed * mass * np.linalg.solve(wheels.spun.system.M, column)
     torques = [(TorqueHistory(name, [0.0], [load * r]), row) for name, r, row in zip("ab", RADII, np.eye(2))]
-    known = {"duration": 3.0 * period, "step": period / 800, "speed": 10.0}
-    run = march_flanks(wheels.spun, torques, start=start, contact_loss=True, records=Records(), **known)
+    options = {"duration": 3.0 * period, "step": period / 800, "speed": 10.0}
+    run = march_flanks(wheels.spun, torques, start=start, contact_loss=True, records=Records(), **options)
     t = run.time % period
     touch = rest * (1.0 - np.cos(w * (t - flight))) + speed / w * np.sin(w * (t - flight))
     wanted = np.where(t < flight, -speed * t + 0.5 * load / mass * t**2, touch)
@@ -387,7 +387,9 @@ def chain_in_time(tables: dict[str, Any], duration: float, rate: float, harmonic
 def chain_balance(model: GearboxInTime, carriers: dict[str, int], meshes: dict[str, int]) -> PeriodicSolution:
     """Solve for the motion of all stages at once, with lines up to orders of some base frequencies by name."""
     box, highest = model.box, carriers | meshes
-    excites = [one.mesh_base for one in box.stages].index(box.bases.index(next(iter(meshes or ["second stage mesh"]))))
+    excites = [running_stage.mesh_base for running_stage in box.stages].index(
+        box.bases.index(next(iter(meshes or ["second stage mesh"])))
+    )
     orders = lines_together(box, excites, max(meshes.values(), default=0), max(carriers.values()))
     samples = tuple(
         max(4 * highest[name], 16) if name in carriers else max(4 * highest[name], 32) if name in meshes else 1
@@ -415,7 +417,7 @@ def chain_apart(model: GearboxInTime, solution: PeriodicSolution) -> tuple[March
         forces = [ring.evaluate(motion[:, columns], None)[0][:, 0] for motion in (x, run.motion)]
         pressed.append((np.abs(forces[0] - forces[1]).max(), np.abs(forces[0]).max()))
     if pressed:
-        apart["play"] = float(max(one for one, _ in pressed) / max(size for _, size in pressed))
+        apart["play"] = float(max(force for force, _ in pressed) / max(size for _, size in pressed))
     return run, apart
 
 

@@ -148,10 +148,10 @@ def _compared(mesh_frequency: float, label: str) -> tuple[Row, ...]:
     rows = []
     for lines in (2 * HARMONICS, 3 * HARMONICS):
         for method in ("fixed point", "direct"):
-            found = _solve(mesh_frequency, response_harmonics=lines, tolerance=1e-11, method=method)
-            if not found.converged[0]:
+            solution = _solve(mesh_frequency, response_harmonics=lines, tolerance=1e-11, method=method)
+            if not solution.converged[0]:
                 continue
-            ours = sample(found.deflection[0], reference.shape[1])
+            ours = sample(solution.deflection[0], reference.shape[1])
             error = _distance(ours, reference)
             quantity = f"{label}, {method}, {lines} harmonics: largest difference over peak to peak"
             if lines == 3 * HARMONICS:
@@ -267,8 +267,8 @@ def modes_kept() -> tuple[Row, ...]:
 
 
 def _periodic(modes, excitation, frequency):
-    found = solve_spectral(modes, excitation, frequency, response_harmonics=3 * HARMONICS)
-    return sample(found.deflection[0], 128)
+    response = solve_spectral(modes, excitation, frequency, response_harmonics=3 * HARMONICS)
+    return sample(response.deflection[0], 128)
 
 
 def _distance(ours, reference) -> float:

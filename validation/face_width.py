@@ -107,15 +107,15 @@ def springs() -> tuple[Row, ...]:
 
     case = "slices without coupling, c' 11.084 N/(mm um), b 25 mm, "
     for amount, factor in ((2, "1.106"), (5, "1.266"), (10, "1.532")):
-        found = spring_loads(1e-6 * amount * places(25), 100e3).max()
-        rows.append(printed("slices", ISO, f"{case}100 N/mm, {amount} um: K_Hbeta", factor, found))
-    found = spring_loads(60e-6 * places(200), 100e3)
-    edge = 1.5 * found.max() - 0.5 * np.sort(found)[-2]
+        largest = spring_loads(1e-6 * amount * places(25), 100e3).max()
+        rows.append(printed("slices", ISO, f"{case}100 N/mm, {amount} um: K_Hbeta", factor, largest))
+    largest = spring_loads(60e-6 * places(200), 100e3)
+    edge = 1.5 * largest.max() - 0.5 * np.sort(largest)[-2]
     law = np.sqrt(2 * 60e-6 * SPRING / 100e3)
     rows.append(within("slices", "ISO 6336-1, root law", case + "100 N/mm, 60 um: K_Hbeta", law, edge, 2e-3))
-    found = spring_loads(10e-6 * (2 * places(400)) ** 2, 200e3).max()
+    largest = spring_loads(10e-6 * (2 * places(400)) ** 2, 200e3).max()
     name = case + "200 N/mm, crowning 10 um: K_Hbeta"
-    rows.append(within("slices", "1 + C c / (3 w)", name, 1.185, found, 1e-3, relative=False))
+    rows.append(within("slices", "1 + C c / (3 w)", name, 1.185, largest, 1e-3, relative=False))
     return tuple(rows)
 
 
@@ -166,8 +166,8 @@ def cantilever_plate() -> tuple[Row, ...]:
     K, (k, weight) = wave_stiffness(grid, unit), np.polynomial.legendre.leggauss(48)
     k, weight = 15 * (k + 1), 15 * weight
     moved, moment = [], []
-    for one in k:
-        matrix = (K[0] + one * K[1] + one**2 * K[2]).tocsc()
+    for wave_number in k:
+        matrix = (K[0] + wave_number * K[1] + wave_number**2 * K[2]).tocsc()
         u = np.zeros(3 * grid.n_nodes)
         u[free] = symmetric_factor(matrix[free][:, free]).solve(load[free])
         moved.append(load @ u)
@@ -179,8 +179,8 @@ def cantilever_plate() -> tuple[Row, ...]:
     return (
         within("plate", JARAMILLO, name + "w D/(P a^2) under the load", 0.16654, at_load * bending, 5e-3),
         *(
-            within("plate", JARAMILLO, f"{name}w along the edge at z/a {z}", ratio, one / at_load, 5e-3)
-            for z, ratio, one in zip((0.5, 1.0), (0.728, 0.411), along, strict=True)
+            within("plate", JARAMILLO, f"{name}w along the edge at z/a {z}", ratio, displacement / at_load, 5e-3)
+            for z, ratio, displacement in zip((0.5, 1.0), (0.728, 0.411), along, strict=True)
         ),
         within("plate", JARAMILLO, name + "root moment over P", 0.50871, weight @ moment / np.pi, 5e-3),
     )
@@ -202,7 +202,7 @@ def _fields(points, z, twist):
     y = points[:, :1] * sin + points[:, 1:] * cos
 
     def turned(field):
-        u, v, w = (np.broadcast_to(one, x.shape) for one in field(x, y, np.broadcast_to(z, x.shape)))
+        u, v, w = (np.broadcast_to(component, x.shape) for component in field(x, y, np.broadcast_to(z, x.shape)))
         return np.stack([cos * u + sin * v, cos * v - sin * u, w], axis=1).ravel()
 
     return turned
@@ -213,7 +213,7 @@ def solid_elements() -> tuple[Row, ...]:
     grid, nu, b = coarse_sectors().sun.grid, STEEL.poisson_ratio, WIDTH
     scalar = basis(grid)
     x, y = np.asarray(scalar.global_coordinates())
-    area, about_y, polar = ((one * scalar.dx).sum() for one in (1, x * x, x * x + y * y))
+    area, about_y, polar = ((weight * scalar.dx).sum() for weight in (1, x * x, x * x + y * y))
     E, mu, twist = STEEL.youngs_modulus, STEEL.shear_modulus, np.tan(np.deg2rad(20)) / 0.02
     rows = []
 
@@ -255,9 +255,9 @@ def _waves_of_solid(grid, twist) -> tuple[Row, ...]:
     k, axial = 2 * np.pi / WIDTH, axial_matrices(WIDTH, 4, 8)
     first, _, second = section = section_matrices(grid, STEEL, twist)
     field = np.random.default_rng(0).normal(size=3 * grid.n_nodes)
-    u = [np.outer(field, one(k * axial[0])).ravel() for one in (np.cos, np.sin)]
+    u = [np.outer(field, trigonometric(k * axial[0])).ravel() for trigonometric in (np.cos, np.sin)]
     K = solid_stiffness(section, axial)
-    solid = sum(one @ (K @ one) for one in u)
+    solid = sum(shape @ (K @ shape) for shape in u)
     wave = WIDTH * (field @ (first @ field) + k**2 * (field @ (second @ field)))
     straight = [section_matrices(grid, STEEL, 0.0), wave_stiffness(grid, STEEL)]
     turn = sp.diags_array(np.tile([1, 1, -1j], grid.n_nodes))
@@ -280,22 +280,22 @@ def solid_sun(*, mirrors: bool, width: float = WIDTH):
     gears, grid = reference_set(), coarse_sectors().sun.grid
     stations, _, loads, seen = observed_flanks(grid, gears.sun)
     along = root_functionals(grid, gears.sun, STEEL, state="plane strain")
-    loads, seen = (_at_roll(one, stations.roll, _pitch_roll()) for one in (loads, seen))
-    loads, seen, root = (_solid_columns(one) for one in (loads, seen, along.columns))
+    loads, seen = (_at_roll(of_stations, stations.roll, _pitch_roll()) for of_stations in (loads, seen))
+    loads, seen, root = (_solid_columns(of_stations) for of_stations in (loads, seen, along.columns))
     axial = np.zeros(root.shape)
     axial[3 * along.nodes + 2, np.arange(len(along.nodes))] = 1.0
     columns, m = np.hstack([seen, root, axial]), len(along.nodes)
     axial, section = axial_matrices(width, 1, ORDER), section_matrices(grid, STEEL, 0.0)
-    found = solid_compliance(grid, section, axial, gears.sun.teeth, loads, columns, mirrors=mirrors)[0]
+    compliance = solid_compliance(grid, section, axial, gears.sun.teeth, loads, columns, mirrors=mirrors)[0]
     s, w = legendre.leggauss(ORDER)
     places = width / SLICES * (np.arange(SLICES) + 0.5) - 0.5 * width
     z = (places[:, None] + width / SLICES * 0.5 * s).ravel()
     mean = np.einsum("nsp,s->np", axial_shapes(width, 1, ORDER, z).reshape(SLICES, ORDER, -1), 0.5 * w)
-    found = found.reshape(2 * m + 1, ORDER + 1, ORDER + 1) @ mean.T
+    compliance = compliance.reshape(2 * m + 1, ORDER + 1, ORDER + 1) @ mean.T
     # slopes along the axis are of the same polynomials
     lateral = plane_modulus(STEEL, "plane strain") * STEEL.poisson_ratio
-    extended = lateral * np.linalg.solve(axial[1], axial[2]) @ found[1 + m :]
-    return mean @ found[0], axial_shapes(width, 1, ORDER, places) @ (found[1 : 1 + m] + extended)
+    extended = lateral * np.linalg.solve(axial[1], axial[2]) @ compliance[1 + m :]
+    return mean @ compliance[0], axial_shapes(width, 1, ORDER, places) @ (compliance[1 : 1 + m] + extended)
 
 
 def _pitch_roll() -> float:
@@ -339,10 +339,10 @@ def sun_like_pair(width: float = WIDTH) -> SunLikePair:
     gear, grid = gears.sun, coarse.sun.grid
     stations, _, loads, seen = observed_flanks(grid, gear)
     roll = _pitch_roll()
-    loads, seen = (_at_roll(one, stations.roll, roll) for one in (loads, seen))
+    loads, seen = (_at_roll(columns, stations.roll, roll) for columns in (loads, seen))
     whole = {"count": gear.teeth, "rim": "rim"}
-    solid = [_solid_columns(one) for one in (loads, seen)]
-    mirror, free = (width / SLICES * solid_sun(mirrors=one, width=width)[0] for one in (True, False))
+    solid = [_solid_columns(columns) for columns in (loads, seen)]
+    mirror, free = (width / SLICES * solid_sun(mirrors=with_mirrors, width=width)[0] for with_mirrors in (True, False))
     parts, T, compared = wave_stiffness(grid, STEEL), cosines(SLICES), []
     for m in range(1, 5):
         K = (parts[0] + (k := m * np.pi / width) * parts[1] + k**2 * parts[2]).tocsc()
@@ -352,8 +352,8 @@ def sun_like_pair(width: float = WIDTH) -> SunLikePair:
         compared.append((seen_wave, T[m] @ mirror @ T[m]))
     coarse = make_sectors(reference_set(width), STEEL, flank_elements=6, refine=0.5)
     waves, k = width_waves(coarse, STEEL, SLICES), np.pi / width * np.arange(1, SLICES)
-    known = [_regular(one.sun, roll, width) for one in waves.bodies]
-    change = 2 * CubicSpline(np.log(waves.wave_number), known)(np.log(k))
+    regular = [_regular(body.sun, roll, width) for body in waves.bodies]
+    change = 2 * CubicSpline(np.log(waves.wave_number), regular)(np.log(k))
     change = np.append(0.0, change + width * replace(waves, wave_number=k).local[:, 0])
     waves_of_width = T.T @ (change[:, None] * T)
     across = {"mirror": waves_of_width, "free": waves_of_width + 2 * (free - mirror)}
@@ -428,7 +428,7 @@ def root_stresses() -> tuple[Row, ...]:
     at = _station_forces(np.array([_pitch_roll()]), np.ones(1), plane.roll)[:, 0]
     both = np.array([plane.influence, *waves])[:, 0, 1 : len(plane.arc), : len(at)] @ at
     between = _between_slices(each * SLICES)
-    mirror, free = (solid_sun(mirrors=one)[1] for one in (True, False))
+    mirror, free = (solid_sun(mirrors=with_mirrors)[1] for with_mirrors in (True, False))
     whole = mirror[1:].sum(axis=2).max()
     ramp, few = 2 * (np.arange(SLICES) + 0.5) / SLICES, np.zeros((2, SLICES))
     few[0, 5:8] = few[1, -3:] = SLICES / 3
@@ -440,7 +440,7 @@ def root_stresses() -> tuple[Row, ...]:
     ):
         stress = np.einsum("kst,t,km->sm", between, np.repeat(load, each), both)[each // 2 :: each]
         ours, name = stress.max(axis=1) / both[0].max(), f"sun, load {text}: "
-        closed, opened = ((one[1:] @ load).max(axis=0) / whole for one in (mirror, free))
+        closed, opened = ((compliances[1:] @ load).max(axis=0) / whole for compliances in (mirror, free))
         top, ends = closed.max(), opened.max() / closed.max()
         rows += [
             within("root", SOLID, f"{name}largest root stress, mirror planes", top, ours.max(), 0.05),
@@ -504,8 +504,8 @@ def whole_sets() -> tuple[Row, ...]:
         counted("set", "linear teeth", f"{name}tooth pairs that lift, {full}", 0, lifted),
     ]
 
-    def apart(found, some, waves, count):
-        shape = found.setup.images, len(some), count, len(found.mesh), count, len(found.mesh)
+    def apart(computed, exact, waves, count):
+        shape = computed.setup.images, len(exact), count, len(computed.mesh), count, len(computed.mesh)
         return [np.zeros(shape) for _ in waves]
 
     for amount in (2, 4):
@@ -544,7 +544,7 @@ def refinement() -> tuple[Row, ...]:
         ):
             source, name = f"twice the {name}", f"27/40/108, {SET_SLICES} slices, {text} 10 um: "
             factor = other.face_load_factor[0], base.face_load_factor[0]
-            ripple = (float(np.ptp(one.deflection[0])) * 1e6 for one in (other, base))
+            ripple = (float(np.ptp(record.deflection[0])) * 1e6 for record in (other, base))
             rows += [
                 within("refined", source, name + "K_Hbeta", *factor, 0.01),
                 within("refined", source, name + "transmission error, peak to peak [um]", *ripple, 0.02),

@@ -244,7 +244,7 @@ def orders_of_pair() -> tuple[Row, ...]:
     order, lines = lines_of_pair((2,))
     name, step = "orders, pair as a gearbox", 24 / 36
     size = np.abs(lines).max(axis=0)
-    words, found = "24/36, tooth of gear 2: step of the lines [orders]", step_of(order, size, step / 24)
+    words, computed_step = "24/36, tooth of gear 2: step of the lines [orders]", step_of(order, size, step / 24)
     together, each = lines_of_pair((None,)), lines_of_pair(tuple(range(36)))
     alike = np.abs(each[0][:, None] - together[0]) < 1e-6
     missed = np.abs(each[1][:, alike.argmax(axis=0)] - together[1]).max()
@@ -252,7 +252,7 @@ def orders_of_pair() -> tuple[Row, ...]:
     most, source = np.abs(together[1]).max(), "wear of all teeth in one entry, one mesh period"
     text = "24/36, 36 teeth of gear 2 worn alike in 36 entries"
     return (
-        within(name, "L = m z_1/z_2", words, step, found, 1e-9),
+        within(name, "L = m z_1/z_2", words, step, computed_step, 1e-9),
         at_most(name, source, f"{text}: lines of the mesh, largest error over the largest", 1e-6, missed / most),
         at_most(name, source, f"{text}: largest line between them, over the largest", FAINT, other / most),
     )

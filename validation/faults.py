@@ -351,11 +351,11 @@ def wear_at_constant_load() -> tuple[Row, ...]:
     alone = tip[0] - pitch, line - tip[1] + pitch
     for steps in (1, 4):
         for place, flank in enumerate(wear_of_case(case, WearRequest(hours, k, steps)).flanks):
-            own = np.sqrt(flank.radius**2 - base[place] ** 2)
-            from_first = own if place == 0 else line - own
+            roll_length = np.sqrt(flank.radius**2 - base[place] ** 2)
+            from_first = roll_length if place == 0 else line - roll_length
             inside = np.flatnonzero((from_first > alone[0] + 0.1 * pitch) & (from_first < alone[1] - 0.1 * pitch))
             for number in inside[[0, len(inside) // 2, -1]]:
-                ratio = (line - own[number]) / own[number] * teeth[place] / teeth[1 - place]
+                ratio = (line - roll_length[number]) / roll_length[number] * teeth[place] / teeth[1 - place]
                 turns = speed * teeth[0] / teeth[place] / (2.0 * math.pi) * 3600.0 * hours
                 expected = k * case.operation.torque / base[0] / case.set.face_width * abs(1.0 - ratio) * turns
                 text = f"gear {place + 1}, diameter of {2e3 * flank.radius[number]:.2f} mm, steps {steps}: depth [um]"

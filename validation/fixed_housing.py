@@ -72,8 +72,8 @@ def thin_ring(highest: int, direction=DIRECTION, *, foundation=0.0, lowest=0) ->
 def springs(count: int, stiffness: float = SPRING, highest: int = 40) -> np.ndarray:
     """Natural frequencies [Hz] of the ring on radial springs, which its rotation does not feel."""
     held = [Support(2 * np.pi * i / count, stiffness, 0.0) for i in range(count)]
-    known = {"max_diameter": 0, "max_frequency": 1e6, "damping_ratio": 0.0}
-    return supported_ring(thin_ring(highest, lowest=1), held, **known).natural_frequency / (2 * np.pi)
+    options = {"max_diameter": 0, "max_frequency": 1e6, "damping_ratio": 0.0}
+    return supported_ring(thin_ring(highest, lowest=1), held, **options).natural_frequency / (2 * np.pi)
 
 
 _TABLE = {
@@ -87,10 +87,10 @@ def splitting() -> tuple[Row, ...]:
     rows = list[Row]()
     for count, table in _TABLE.items():
         # two rigid motions come first
-        found = springs(count)[2:]
+        support = springs(count)[2:]
         for i, reference in enumerate(table):
             words = f"{count} springs, n = {2 + i // 2}, {'second' if i % 2 else 'first'} natural frequency, Hz"
-            rows.append(printed("splitting", WU, words, reference, found[i]))
+            rows.append(printed("splitting", WU, words, reference, support[i]))
         weak = (2 * np.pi * springs(count, 1e2)[2 : 2 + len(table)]) ** 2
         error = 0.0
         for n in range(2, 2 + len(table) // 2):
@@ -127,10 +127,10 @@ def yielding() -> tuple[Row, ...]:
     """The ring of the reference set on four feet of 20 mm, which press into its rim."""
     rows = list[Row]()
     for (stiffness, mass), frequencies in _FEET.items():
-        found = ring_on_feet(stiffness, mass)
+        casing = ring_on_feet(stiffness, mass)
         for i, reference in enumerate(frequencies):
             words = f"four feet of {stiffness:.0e} N/m, {1e3 * mass:g} g: natural frequency {i + 1}, Hz"
-            rows.append(within("feet", "CalculiX", words, reference, found[i], 0.002))
+            rows.append(within("feet", "CalculiX", words, reference, casing[i], 0.002))
     return tuple(rows)
 
 
@@ -169,7 +169,7 @@ def shaken(paths: MeshPaths, periods: int, *, planet: int | None = None, sense: 
         error[np.arange(N) != planet] = 0.0
     error = 0.08 * np.concatenate([error, 1.2 * error])
     stiffness, deflection, force = (
-        np.tile(one, (1, periods)) for one in (drive.stiffness, drive.deflection, drive.force)
+        np.tile(signal, (1, periods)) for signal in (drive.stiffness, drive.deflection, drive.force)
     )
     return MeshExcitation(
         stiffness * (1 + error), deflection * (1 + 0.5 * error), force, np.zeros(2 * N), periods=periods
@@ -196,24 +196,24 @@ def feet(max_diameter: int, highest: int = 20) -> FixedStructure:
     )
 
 
-def solved(paths: MeshPaths, structure, speeds, *, depth=0.15, harmonics=6, ratio=0.04, **known) -> TwoWayResponse:
+def solved(paths: MeshPaths, structure, speeds, *, depth=0.15, harmonics=6, ratio=0.04, **options) -> TwoWayResponse:
     """The set in a structure by the two-way solution."""
     drive = excitation(paths, int(np.sign(speeds[0])), depth)
     modes = undamped_modes(gears(paths.planet_angles), drive.stiffness.mean(axis=1), damping_ratio=ratio)
-    return solve_two_way(modes, drive, structure, paths, speeds, harmonics=(2, harmonics), **known)
+    return solve_two_way(modes, drive, structure, paths, speeds, harmonics=(2, harmonics), **options)
 
 
 def order_rules() -> tuple[Row, ...]:
     """Every planet solved for: what orders remain, and what one planet alone gives."""
     structure, rows, speeds = feet(8), list[Row](), np.array([-40.0])
-    every, one = (MeshPaths(97, EQUAL, 0.1, symmetry) for symmetry in (1, 3))
+    every, turned_once = (MeshPaths(97, EQUAL, 0.1, symmetry) for symmetry in (1, 3))
     for paths, step, words in ((every, 3, "equal spacing, N = 3"), (PAIR, 2, "(0, 24, 50, 74)/100 turn")):
         order, lines = structure_lines(structure, solved(paths, structure, speeds))
         size = np.abs(order**2 * lines)
         leak = size[..., order % step != 0].max() / size.max()
         words = f"{words}: largest acceleration off the multiples of {step} over the largest"
         rows.append(at_most("order rules", "symmetry", words, 1e-10, leak))
-    full, single = (structure_lines(structure, solved(p, structure, speeds)) for p in (every, one))
+    full, single = (structure_lines(structure, solved(p, structure, speeds)) for p in (every, turned_once))
     apart = np.abs(full[1][..., full[0] % 3 == 0] - single[1]).max() / np.abs(single[1]).max()
     rows.append(at_most("order rules", "all planets", "one planet against three: sensor lines", 1e-10, apart))
     return tuple(rows)
@@ -222,8 +222,8 @@ def order_rules() -> tuple[Row, ...]:
 def _foundation(max_diameter: int, damping: float) -> tuple[CyclicModes, FixedStructure]:
     """The ring on a foundation all around, and the structure that it is."""
     ring = thin_ring(max_diameter, foundation=2e10)
-    known = {"max_diameter": max_diameter, "max_frequency": 1e6, "damping_ratio": damping}
-    return ring, supported_ring(ring, (), sensor_angles=(0.3,), **known)
+    options = {"max_diameter": max_diameter, "max_frequency": 1e6, "damping_ratio": damping}
+    return ring, supported_ring(ring, (), sensor_angles=(0.3,), **options)
 
 
 def joined(paths: MeshPaths, ring: CyclicModes, max_diameter: int) -> MechanicalSystem:
@@ -251,11 +251,11 @@ def _apart(two_way, present, structure, field, teeth, base, leaders) -> tuple[np
         present.force[:, leaders],
     )
     lines = component_lines(field, teeth, base, 0.3)
-    order, heard = structure_lines(structure, two_way)
+    order, sensor_response = structure_lines(structure, two_way)
     same, expected = np.isin(order, lines.order), np.zeros((len(base), len(order)), complex)
     expected[:, same] = lines.displacement[:, np.isin(lines.order, order)]
     still = order < 0.5 * teeth
-    moving = np.abs(heard[:, 0] - expected)[:, ~still].max(axis=1) / np.abs(expected[:, ~still]).max(axis=1)
+    moving = np.abs(sensor_response[:, 0] - expected)[:, ~still].max(axis=1) / np.abs(expected[:, ~still]).max(axis=1)
     apart = np.abs(middle - force).max(axis=(1, 2)) / np.abs(force[..., 1:]).max(axis=(1, 2))
     return apart, moving
 
@@ -275,7 +275,7 @@ def axisymmetric() -> tuple[Row, ...]:
     kept = {"excitation_harmonics": 2, "response_harmonics": 6}
     for ratio in (0.0, 0.01, 0.05):
         structure = _foundation(5, ratio)[1]
-        modes, rigid = (undamped_modes(one, mean, damping_ratio=ratio) for one in (whole, system))
+        modes, rigid = (undamped_modes(equations, mean, damping_ratio=ratio) for equations in (whole, system))
         present = solve_spectral(modes, drive, speed / (2 * np.pi), tolerance=1e-12, method="direct", **kept)
         field = np.swapaxes(modes.shape[len(system.K) :] @ present.modal, 1, 2)
         field = field @ circumferential(ring, ring.output[:, 0], 5)
@@ -298,21 +298,21 @@ def axisymmetric() -> tuple[Row, ...]:
 
 def _convective() -> tuple[Row, ...]:
     structure, paths, speed, ratio = _foundation(5, 0.03)[1], MeshPaths(37, EQUAL, 0.1), 20.0, 0.04
-    found = solved(paths, structure, np.array([-speed]), harmonics=8, ratio=ratio, tolerance=1e-13)
+    response = solved(paths, structure, np.array([-speed]), harmonics=8, ratio=ratio, tolerance=1e-13)
     drive, system = excitation(paths, -1), gears(EQUAL)
     mean = drive.stiffness.mean(axis=1)
     damping, between = modal_damping(system, mean, ratio), np.subtract.outer(EQUAL, EQUAL)
-    receptance, own = np.empty((6, 6, 1, 9), complex), structure.natural_frequency
+    receptance, natural = np.empty((6, 6, 1, 9), complex), structure.natural_frequency
     for h in range(9):
         w = h * 37 * speed
         free = system.W.T @ np.linalg.solve(system.K + 1j * w * damping - w**2 * system.M, system.W)
         for n in range(-5, 6):
             # the carrier turns backwards
             wave = (h * 37 + n) * speed
-            modal = 1 / (own**2 - wave**2 + 2j * 0.03 * own * wave)
+            modal = 1 / (natural**2 - wave**2 + 2j * 0.03 * natural * wave)
             free[3:, 3:] += modal @ np.abs(structure.ring_shape[:, n + 5]) ** 2 * np.exp(1j * n * between)
         receptance[:, :, 0, h] = np.linalg.solve(np.eye(6) + free * mean, free)
-    k, s, F = (pad(harmonics_of(one, 2), 8)[:, None] for one in (drive.stiffness, drive.deflection, drive.force))
+    k, s, F = (pad(harmonics_of(signal, 2), 8)[:, None] for signal in (drive.stiffness, drive.deflection, drive.force))
     forcing = F - Product(k)(s)
     source = -np.einsum("ijsh,jsh->ish", receptance, forcing)
     rigid = system.W.T @ np.linalg.solve(system.K, system.load)
@@ -320,7 +320,7 @@ def _convective() -> tuple[Row, ...]:
     fluctuating = np.array(k)
     fluctuating[..., 0] -= mean[:, None]
     force = forcing + Product(k)(solve_direct(HarmonicProblem(receptance, Product(fluctuating), source)))
-    middle = found.force[0][:, np.isin(found.order, np.arange(9) * 37)]
+    middle = response.force[0][:, np.isin(response.order, np.arange(9) * 37)]
     apart = np.abs(middle - force[:, 0]).max() / np.abs(force[..., 1:]).max()
     words = "mesh forces against the carrier frame with convective terms, 37 teeth"
     return (at_most("axisymmetric", "solve_direct", words, 1e-10, apart),)
@@ -332,8 +332,8 @@ def _moving(structure: FixedStructure, angles) -> np.ndarray:
     return np.real(np.exp(1j * np.multiply.outer(angles, n)) @ structure.ring_shape.T)
 
 
-def _sampled(found: TwoWayResponse, theta) -> np.ndarray:
-    return np.real(found.force[0] @ np.exp(1j * np.outer(found.order, theta)))
+def _sampled(response: TwoWayResponse, theta) -> np.ndarray:
+    return np.real(response.force[0] @ np.exp(1j * np.outer(response.order, theta)))
 
 
 def _short(structure: FixedStructure, count: int, kept: int) -> FixedStructure:
@@ -356,8 +356,8 @@ def _coordinates(structure: FixedStructure) -> np.ndarray:
     pairs = np.sqrt(2) * np.stack([structure.wave_shape.real, -structure.wave_shape.imag], axis=-1)
     return np.stack(
         [
-            structure.wave_shape[:, i].real if one == 0 else pairs[:, i, 0] if one > 0 else pairs[:, i - 1, 1]
-            for i, one in enumerate(n)
+            structure.wave_shape[:, i].real if diameter == 0 else pairs[:, i, 0] if diameter > 0 else pairs[:, i - 1, 1]
+            for i, diameter in enumerate(n)
         ]
     )
 
@@ -370,17 +370,17 @@ def in_time() -> tuple[Row, ...]:
     moves with its velocity in space, turned into that frame.
     """
     paths, ring = MeshPaths(37, EQUAL, 0.1, 3), thin_ring(2, foundation=2e10)
-    known = {"max_diameter": 2, "max_frequency": 1e6, "damping_ratio": 0.03, "sensor_angles": (0.3, 2.0)}
+    options = {"max_diameter": 2, "max_frequency": 1e6, "damping_ratio": 0.03, "sensor_angles": (0.3, 2.0)}
     mean = excitation(paths).stiffness.mean(axis=1)
     joint = modal_damping(joined(paths, ring, 2), mean, 0.04)
     return (
         *_in_time("ten degrees of freedom", paths, _short(feet(6), 4, 2), None),
-        *_in_time("damping of gears and ring as a whole", paths, supported_ring(ring, FEET, **known), joint),
-        *_in_time("errors that turn", paths, supported_ring(ring, FEET, **known), joint, shaken(paths, 2)),
+        *_in_time("damping of gears and ring as a whole", paths, supported_ring(ring, FEET, **options), joint),
+        *_in_time("errors that turn", paths, supported_ring(ring, FEET, **options), joint, shaken(paths, 2)),
         *_in_time(
             "an error of one planet",
             paths,
-            supported_ring(ring, FEET, **known),
+            supported_ring(ring, FEET, **options),
             joint,
             shaken(paths, 2, planet=1),
         ),
@@ -389,17 +389,17 @@ def in_time() -> tuple[Row, ...]:
 
 def _equations(paths: MeshPaths, structure: FixedStructure, joint, drive, speed: float, ratio: float):
     """Rate of states of gears and modes as `solve_ivp` takes it, mesh forces, and the number of states."""
-    system, mean, own = gears(EQUAL), drive.stiffness.mean(axis=1), structure.natural_frequency
-    n, m = len(system.K), len(own)
+    system, mean, natural = gears(EQUAL), drive.stiffness.mean(axis=1), structure.natural_frequency
+    n, m = len(system.K), len(natural)
     alone, size = modal_damping(system, mean, ratio), 2 * (n + m)
     P = drive.periods
-    series = [harmonics_of(one, 2 * P) for one in (drive.stiffness, drive.deflection, drive.force)]
+    series = [harmonics_of(signal, 2 * P) for signal in (drive.stiffness, drive.deflection, drive.force)]
     shape = np.zeros((0, m)) if joint is None else _coordinates(structure)
 
     def forces(theta, state):
         """Mesh forces, and the modes' displacement at the meshes, of states (size, ...)."""
         wave = np.exp(1j * 37 / P * theta * np.arange(2 * P + 1))
-        k, s, F = (np.real(one @ wave)[:, None] for one in series)
+        k, s, F = (np.real(lines_of_signal @ wave)[:, None] for lines_of_signal in series)
         path = _moving(structure, np.array(EQUAL) + 0.1 + theta)
         d = system.W.T @ state[:n]
         d[3:] -= path @ state[n : n + m]
@@ -408,7 +408,7 @@ def _equations(paths: MeshPaths, structure: FixedStructure, joint, drive, speed:
     def damped(theta, v, r):
         """Damping forces on the gears and modes of their velocities."""
         if joint is None:
-            return alone @ v, (2 * structure.damping_ratio * own)[:, None] * r
+            return alone @ v, (2 * structure.damping_ratio * natural)[:, None] * r
         turn = np.eye(len(shape))
         for i in np.flatnonzero(structure.wave_order < 0):
             angle = structure.wave_order[i - 1] * theta
@@ -423,7 +423,7 @@ def _equations(paths: MeshPaths, structure: FixedStructure, joint, drive, speed:
         x, q, v, r = np.split(state, [n, n + m, 2 * n + m])
         on_gears, on_modes = damped(speed * time, v, r)
         load = system.load[:, None] * constant - system.K @ x - on_gears - system.W @ force
-        modal = path.T @ force[3:] - (own**2)[:, None] * q - on_modes
+        modal = path.T @ force[3:] - (natural**2)[:, None] * q - on_modes
         return np.concatenate([v, r, np.linalg.solve(system.M, load), modal]).ravel()
 
     return rate, forces, size
@@ -434,14 +434,14 @@ def _in_time(
 ) -> tuple[Row, ...]:
     speed, drive = 20.0, drive or excitation(paths)
     modes = rigid_modes(paths, drive)
-    found = solve_two_way(
+    response = solve_two_way(
         modes, drive, structure, paths, np.array([speed]), harmonics=(2, 12), side_bands=12, damping=joint
     )
     rate, forces, size = _equations(paths, structure, joint, drive, speed, 0.04)
     n, m = len(modes.shape), len(structure.natural_frequency)
     # the periodic motion by the monodromy matrix: columns of unit starts without load, then the loaded one
     start, constant = np.eye(size, size + 1), np.append(np.zeros(size), 1.0)
-    times = np.linspace(0, found.turns * 2 * np.pi / speed, 200 * found.turns + 1)
+    times = np.linspace(0, response.turns * 2 * np.pi / speed, 200 * response.turns + 1)
     precise = {"method": "DOP853", "rtol": 1e-8, "atol": 1e-11, "t_eval": times}
     states = solve_ivp(rate, (0, times[-1]), start.ravel(), args=(constant,), **precise).y
     states = states.reshape(size, size + 1, -1)
@@ -451,13 +451,13 @@ def _in_time(
     for i, time in enumerate(times):
         linear, source, _ = forces(speed * time, motion[:, i : i + 1])
         exact[:, i] = (linear + source)[:, 0]
-    ours = _sampled(found, speed * times)
+    ours = _sampled(response, speed * times)
     solved_for = [0, 3] if len(ours) == 2 else slice(None)
     apart = np.abs(ours - exact[solved_for]).max() / np.ptp(exact)
-    order, lines = structure_lines(structure, found)
-    heard = np.real(lines[0] @ np.exp(1j * np.outer(order, speed * times)))
+    order, lines = structure_lines(structure, response)
+    at_sensor = np.real(lines[0] @ np.exp(1j * np.outer(order, speed * times)))
     expected = structure.sensor_shape.T @ motion[n : n + m]
-    moved = np.abs(heard - expected).max() / np.ptp(expected)
+    moved = np.abs(at_sensor - expected).max() / np.ptp(expected)
     return (
         at_most("in time", "DOP853", f"{words}: mesh forces over their range", 1e-5, apart),
         at_most("in time", "DOP853", f"{words}: sensors over their range", 1e-5, moved),
@@ -467,8 +467,8 @@ def _in_time(
 def multipliers() -> tuple[Row, ...]:
     """Eleven degrees of freedom, hardly damped: the largest multiplier of a turn, stable and unstable."""
     paths, ring, rows = MeshPaths(37, EQUAL, 0.1, 3), thin_ring(2, foundation=2e10), list[Row]()
-    ratio, known = 2e-4, {"max_diameter": 2, "max_frequency": 1e6, "damping_ratio": 2e-4}
-    structure = supported_ring(ring, FEET, **known)
+    ratio, options = 2e-4, {"max_diameter": 2, "max_frequency": 1e6, "damping_ratio": 2e-4}
+    structure = supported_ring(ring, FEET, **options)
     drives = {depth: excitation(paths, depth=depth) for depth in (0.15, 0.4)}
     for words, speed, drive in (
         ("stable", 100.0, drives[0.15]),
@@ -483,44 +483,44 @@ def multipliers() -> tuple[Row, ...]:
         reference = np.abs(np.linalg.eigvals(turn.reshape(size, size))).max()
         modes = undamped_modes(gears(EQUAL), mean, damping_ratio=ratio)
         kept = {"harmonics": 2, "damping": joint, "frequency_ratio": 1e3, "tolerance": 1e-8}
-        found = turn_stability(modes, drive, structure, paths, [speed], **kept)
+        multipliers = turn_stability(modes, drive, structure, paths, [speed], **kept)
         turns = "a turn" if drive.periods == 1 else f"{drive.periods} turns"
         text = f"eleven degrees of freedom, {words}: modulus of the largest multiplier of {turns}"
-        rows.append(within("stability", "DOP853", text, reference, found.modulus[0], 1e-6))
+        rows.append(within("stability", "DOP853", text, reference, multipliers.modulus[0], 1e-6))
         text = f"{words}: 1 where the modulus is at most 1"
-        rows.append(counted("stability", "DOP853", text, int(reference <= 1), int(found.stable[0])))
+        rows.append(counted("stability", "DOP853", text, int(reference <= 1), int(multipliers.stable[0])))
     # the rotation of a ring is the same in both frames: present verdict, over a mesh period
     ring = thin_ring(0, foundation=2e10)
     structure = supported_ring(ring, (), max_diameter=0, max_frequency=1e6, damping_ratio=ratio)
     for words, speed, depth in (("stable", 100.0, 0.15), ("unstable", 170.0, 0.4)):
         drive = excitation(paths, depth=depth)
         mean, whole = drive.stiffness.mean(axis=1), joined(paths, ring, 0)
-        modes, rigid = (undamped_modes(one, mean, damping_ratio=ratio) for one in (whole, gears(EQUAL)))
+        modes, rigid = (undamped_modes(equations, mean, damping_ratio=ratio) for equations in (whole, gears(EQUAL)))
         frequency, joint = 37 * speed / (2 * np.pi), modal_damping(whole, mean, ratio)
         kept = {"excitation_harmonics": 2, "frequency_ratio": 1e3, "steps": 800}
         present = stability(modes, drive, frequency, **kept).modulus[0] ** 37
         kept = {"harmonics": 2, "damping": joint, "frequency_ratio": 1e3, "tolerance": 1e-8}
-        found = turn_stability(rigid, drive, structure, paths, [speed], **kept).modulus[0]
+        multipliers = turn_stability(rigid, drive, structure, paths, [speed], **kept).modulus[0]
         text = f"set on its foundation, n = 0, {words}: modulus of the largest multiplier of a turn"
-        rows.append(within("stability", "present verdict", text, float(present), found, 1e-6))
+        rows.append(within("stability", "present verdict", text, float(present), multipliers, 1e-6))
     return tuple(rows)
 
 
 def by_samples() -> tuple[Row, ...]:
     """Forces at samples of a turn, products in time, receptances by FFT, and GMRES, for all planets."""
     paths, speed, structure = MeshPaths(97, EQUAL, 0.1, 3), 2 * np.pi, feet(14)
-    found = solved(paths, structure, np.array([speed]), harmonics=10)
+    response = solved(paths, structure, np.array([speed]), harmonics=10)
     drive, system, count = excitation(paths), gears(EQUAL), 2048
     mean, theta, order = drive.stiffness.mean(axis=1), 2 * np.pi * np.arange(count) / count, np.arange(1025)
-    damping, w, own = modal_damping(system, mean, 0.04), speed * order, structure.natural_frequency
+    damping, w, natural = modal_damping(system, mean, 0.04), speed * order, structure.natural_frequency
     dynamic = system.K + np.multiply.outer(1j * w, damping) - np.multiply.outer(w**2, system.M)
     gear = system.W.T @ np.linalg.solve(dynamic, system.W)
-    modal = 1 / (own**2 - w[:, None] ** 2 + 0.06j * own * w[:, None])
+    modal = 1 / (natural**2 - w[:, None] ** 2 + 0.06j * natural * w[:, None])
     angles = np.add.outer(theta, np.array(EQUAL) + 0.1)
     path, wave = _moving(structure, angles), np.exp(1j * np.multiply.outer(angles, np.arange(-14, 15)))
     k, s, F = (
-        np.real(harmonics_of(one, 2) @ np.exp(1j * 97 * np.outer(np.arange(3), theta)))
-        for one in (drive.stiffness, drive.deflection, drive.force)
+        np.real(harmonics_of(signal, 2) @ np.exp(1j * 97 * np.outer(np.arange(3), theta)))
+        for signal in (drive.stiffness, drive.deflection, drive.force)
     )
 
     def deflection(force):
@@ -558,7 +558,7 @@ def by_samples() -> tuple[Row, ...]:
         M=operator(shape, matvec=nearly, dtype=float),
     )
     exact = force.reshape(6, count)[[0, 3]]
-    apart = np.abs(_sampled(found, theta) - exact).max() / np.ptp(exact)
+    apart = np.abs(_sampled(response, theta) - exact).max() / np.ptp(exact)
     words = "four feet, 14 nodal diameters, 60 rpm of the carrier: mesh forces over their range"
     return (
         counted("by samples", "GMRES", "GMRES converged", 1, int(failed == 0)),
@@ -600,7 +600,7 @@ def green() -> tuple[Row, ...]:
     )
     constant, none, paths = np.array([[[0.0], [1.0]]]), np.zeros(1), MeshPaths(1, (0.0,))
     load = TwoWayResponse(np.array([speed]), np.zeros(1, int), constant, *[none] * 3, *[none.astype(int)] * 2, paths)
-    heard_order, heard = structure_lines(structure, load)
+    heard_order, sensor_response = structure_lines(structure, load)
     n = np.arange(1, top + 1)
     exact = np.empty(top, complex)
     for K in n:
@@ -611,7 +611,7 @@ def green() -> tuple[Row, ...]:
         away = _green(np.subtract.outer(np.append(places, sensor), places), w)
         at = np.linalg.solve(np.eye(4) + SPRING * away[:4], free[:4])
         exact[K - 1] = 2 * (free[4] - SPRING * away[4] @ at)
-    lines = heard[0, 0, np.isin(heard_order, n)]
+    lines = sensor_response[0, 0, np.isin(heard_order, n)]
     apart = np.abs(lines - exact).max() / np.abs(exact).max()
     words = "four radial springs, force at 500 rad/s: lines of a sensor over the largest"
     return (at_most("moving force", "Green's function", words, 1e-6, apart),)
@@ -651,7 +651,7 @@ def array_factors() -> tuple[Row, ...]:
     rows = list[Row]()
     for (sun, ring), place, factors in _PRINTED:
         apart = np.abs(array_factor(2 * np.pi * place, [*factors]) - [*factors.values()]).max()
-        words = f"{sun}/{ring}, planets at {', '.join(f'{360 * one:.4g}' for one in place)} deg: factors of "
+        words = f"{sun}/{ring}, planets at {', '.join(f'{360 * angle:.4g}' for angle in place)} deg: factors of "
         source = "closed form, three digits"
         rows.append(at_most("array factor", source, f"{words}{len(factors)} orders", 0.0005, apart))
     for i, (words, (sun, ring), place, factor) in enumerate(_GROUPS, 1):
@@ -682,11 +682,11 @@ def turning_errors() -> tuple[Row, ...]:
             # of the sun its turn against the arm of each planet
             error = ring / sun * theta[:, None] - psi if turns == sun else ring / planet * theta[:, None]
             shaken = np.array([turns != planet or j == 0 for j in range(4)]) * 0.3 * bool(turns)
-            heard = (1 + shaken * np.cos(error)) * np.cos(ring * passing) * np.exp(np.cos(passing))
-            spectrum = order_spectrum(heard.sum(axis=1))
+            sensor_signal = (1 + shaken * np.cos(error)) * np.cos(ring * passing) * np.exp(np.cos(passing))
+            spectrum = order_spectrum(sensor_signal.sum(axis=1))
             lines = np.flatnonzero(spectrum.amplitude > 1e-9 * spectrum.amplitude.max())
-            found = [classify_line(k / count, psi, (ring, sun, planet), tolerance=1e-6) for k in lines if k]
-            kinds = [one.verdict for one in found]
+            classified = [classify_line(k / count, psi, (ring, sun, planet), tolerance=1e-6) for k in lines if k]
+            kinds = [line.verdict for line in classified]
             unequal = len(kinds) - kinds.count(NORMAL)
             # a healthy set has multiples of its symmetry alone
             whole = (lines % count == 0) & (lines // count % (4 if places[1] == 25 else 2) == 0)
@@ -707,13 +707,13 @@ def reference_set_on_supports() -> tuple[Row, ...]:
     static = solve_static(case)
     modes = elastic.solve_modes(case, static)
     held = with_values(case, {"housing.support": weak})
-    dynamics = [elastic.solve_dynamics(one, static, modes) for one in (case, held)]
+    dynamics = [elastic.solve_dynamics(variant, static, modes) for variant in (case, held)]
     present, ours = (elastic.solve_housing(*two) for two in zip((case, held), dynamics))
-    one, other = present.exact, ours.exact
-    apart = np.abs(one.order - one.z_ring * np.rint(one.order / one.z_ring))
-    kept = (one.order < 6.5 * one.z_ring) & (apart <= 14)
-    lines = one.acceleration[0, kept]
-    apart = np.abs(other.acceleration[0, np.isin(other.order, one.order[kept])] - lines).max()
+    theirs, other = present.exact, ours.exact
+    apart = np.abs(theirs.order - theirs.z_ring * np.rint(theirs.order / theirs.z_ring))
+    kept = (theirs.order < 6.5 * theirs.z_ring) & (apart <= 14)
+    lines = theirs.acceleration[0, kept]
+    apart = np.abs(other.acceleration[0, np.isin(other.order, theirs.order[kept])] - lines).max()
     words = "reference set, 250 rpm, damping 1e-4: lines of six mesh harmonics, n to 14, over the largest"
     level = float(ours.supported["one_way_level"][0])
     return (
@@ -744,8 +744,8 @@ def reference_set_in_its_ring() -> tuple[Row, ...]:
     )
     case, rows = with_values(reference_case(), {"housing.form": "exact"}), list[Row]()
     modes = elastic.solve_modes(case, solve_static(case))
-    for ratio, some in ((0.01, speeds[:1]), (0.05, speeds)):
-        for frequency, kept, name in some:
+    for ratio, chosen_speeds in ((0.01, speeds[:1]), (0.05, speeds)):
+        for frequency, kept, name in chosen_speeds:
             apart = _in_its_ring(case, modes, ratio, frequency, kept)
             words = f"reference set, {name}, 108e9 teeth, damping {ratio:g}"
             gate = 1e-10 if kept[0] == 6 else 1e-8
@@ -763,7 +763,7 @@ def _present(whole, drive, ratio: float, frequency, kept) -> tuple[Modes, Any]:
     mean; both halves of the roundings agree to 4e-12.
     """
     few = kept[0] == 6
-    found = list[tuple[Modes, Any]]()
+    modes_and_drives = list[tuple[Modes, Any]]()
     for digits in range(-_ROUNDINGS, _ROUNDINGS + 1) if few else (0,):
         factor = 1.0 + digits * np.finfo(float).eps
         stiffness, flexibility = factor * drive.stiffness, whole.flexibility / factor
@@ -777,11 +777,11 @@ def _present(whole, drive, ratio: float, frequency, kept) -> tuple[Modes, Any]:
             excitation_harmonics=kept[0],
             response_harmonics=kept[1],
         )
-        found.append((joint, response))
-    joint, middle = found[len(found) // 2]
-    force = np.mean([response.force for _, response in found], axis=0)
+        modes_and_drives.append((joint, response))
+    joint, middle = modes_and_drives[len(modes_and_drives) // 2]
+    force = np.mean([response.force for _, response in modes_and_drives], axis=0)
     # modal coordinates have the signs and pairs of their own modes
-    moved = np.mean([modes.shape @ response.modal for modes, response in found], axis=0)
+    moved = np.mean([modes.shape @ response.modal for modes, response in modes_and_drives], axis=0)
     modal = np.linalg.solve(joint.shape, moved) if few else middle.modal
     return joint, replace(middle, force=force, modal=modal)
 

@@ -98,10 +98,10 @@ def _integrated(modes: Any, frequency: float = 1.9e3, count: int = 6) -> float:
     start = np.linalg.solve(np.eye(2 * m) - through.reshape(2 * m, 2 * m), once)
     instants = np.arange(256) / 256 / frequency
     moved = solve_ivp(rates, (0.0, 1.0 / frequency), start, args=(True,), t_eval=instants, **options).y
-    found = solve_spectral(
+    response = solve_spectral(
         basis, excitation, frequency, excitation_harmonics=count, response_harmonics=40, tolerance=1e-11
     )
-    approach = sample(found.deflection[0], 256)[0]
+    approach = sample(response.deflection[0], 256)[0]
     return float(np.abs(approach - row @ moved[:m]).max() / np.ptp(approach))
 
 

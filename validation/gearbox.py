@@ -41,10 +41,10 @@ def frequencies(tables: dict[str, Any]) -> np.ndarray:
 
 def _alike(name: str, source: str, tables: dict[str, Any], expected) -> list[Row]:
     """Number of modes, and the largest difference of their frequencies."""
-    found, expected = frequencies(tables), np.sort(expected)
-    rows = [counted(name, source, "modes", len(expected), len(found))]
+    computed, expected = frequencies(tables), np.sort(expected)
+    rows = [counted(name, source, "modes", len(expected), len(computed))]
     elastic = expected > 1e-3
-    apart = np.abs(found - expected)[elastic] / expected[elastic] if len(found) == len(expected) else [math.inf]
+    apart = np.abs(computed - expected)[elastic] / expected[elastic] if len(computed) == len(expected) else [math.inf]
     rows.append(at_most(name, source, "largest difference of natural frequencies, relative", LARGEST, np.max(apart)))
     return rows
 
@@ -77,21 +77,21 @@ def elastic_ring() -> tuple[Row, ...]:
     path, name = "cases/planetary_27_40_108.toml", "reference set on its foundation"
     expected = np.sort(solve(read_case(path), only="modes")["modes"].modes.frequency)
     tables = elastic_set_tables(path) | {"modes": {"up_to": "500 kHz"}}
-    found = np.sort(solve_gearbox_modes(solve_deflection(read_case(tables))).modes.frequency)[: len(expected)]
+    computed = np.sort(solve_gearbox_modes(solve_deflection(read_case(tables))).modes.frequency)[: len(expected)]
     high = expected > 1e3
     source = "femgear, elastic"
-    apart = np.abs(found[high] / expected[high] - 1.0).max()
+    apart = np.abs(computed[high] / expected[high] - 1.0).max()
     rows = [at_most(name, source, "largest difference of natural frequencies above 1 kHz, relative", LARGEST, apart)]
     low = (expected > 1.0) & ~high
     text = "the same below 1 kHz, where rounding of the highest modes shows"
-    rows.append(at_most(name, source, text, 1e-7, np.abs(found[low] / expected[low] - 1.0).max()))
+    rows.append(at_most(name, source, text, 1e-7, np.abs(computed[low] / expected[low] - 1.0).max()))
     case, name = read_case("cases/helical_23_24_73.toml"), "helical set on its foundation"
     expected = np.sort(solve(case, only="modes")["modes"].modes.frequency)
     box = read_case(gearbox_of_case(case).tables | {"modes": {"up_to": "500 kHz"}})
-    found = np.sort(solve_gearbox_modes(solve_deflection(box)).modes.frequency)[: len(expected)]
+    computed = np.sort(solve_gearbox_modes(solve_deflection(box)).modes.frequency)[: len(expected)]
     text = "largest difference of natural frequencies above 1 Hz, relative"
     elastic = expected > 1.0
-    apart = np.abs(found[elastic] / expected[elastic] - 1.0).max()
+    apart = np.abs(computed[elastic] / expected[elastic] - 1.0).max()
     return (*rows, at_most(name, source, text, 1e-7, apart))
 
 
@@ -101,13 +101,13 @@ def wind_turbine() -> tuple[Row, ...]:
     # the values of the reference are those of a gearbox that stands
     del tables["casing"], tables["sensor"]
     case = read_case(tables)
-    found = solve_deflection(case)
-    model, name = found.model, "five-megawatt chain"
+    state = solve_deflection(case)
+    model, name = state.model, "five-megawatt chain"
     ratio = model.flow.speed["high speed"] / model.flow.speed["main shaft"]
     station = model.seat("high speed", 1.4).station
-    twist = -found.motion[6 * station + 5] / ratio
+    twist = -state.motion[6 * station + 5] / ratio
     stiffness = case.load_case.torque["wind"] / twist
-    modes = solve_gearbox_modes(found).modes
+    modes = solve_gearbox_modes(state).modes
     torsion = next(hertz for hertz, kind in zip(modes.frequency, modes.kind, strict=True) if kind == "torsional")
     source = "NREL/TP-500-38060, Table 5-1"
     exact = (1 + 56 / 19) * (1 + 93 / 18) * 95 / 24
@@ -130,9 +130,9 @@ def statics() -> tuple[Row, ...]:
     """Bearing forces by the lever rule, and thrust of helical teeth by textbooks."""
     tables = pair_tables(helix="15 deg")
     tables["deflection"] = {"slices": 1}
-    found = solve_deflection(read_case(tables))
+    state = solve_deflection(read_case(tables))
     alpha, beta, tangential = math.radians(20.0), math.radians(15.0), 100.0 / 0.036
-    on_input = found.bearing_force[:2]
+    on_input = state.bearing_force[:2]
     rows = [
         within(
             "pair, 15 deg",
@@ -174,11 +174,11 @@ def passes() -> tuple[Row, ...]:
         tables = pair_tables(teeth=True)
         tables["operation"]["load_case"][0]["torque"]["motor"] = torque
         case = read_case(tables)
-        found, far = solve_deflection(case), solve_deflection(case, slopes=[3e-4])
-        rows.append(at_most(f"pair, {torque}", SELF, "passes until slopes agree to 1e-4", 5, len(found.slopes) - 1))
-        apart = np.abs(far.mesh_slope / found.mesh_slope - 1.0).max()
+        state, far = solve_deflection(case), solve_deflection(case, slopes=[3e-4])
+        rows.append(at_most(f"pair, {torque}", SELF, "passes until slopes agree to 1e-4", 5, len(state.slopes) - 1))
+        apart = np.abs(far.mesh_slope / state.mesh_slope - 1.0).max()
         rows.append(at_most(f"pair, {torque}", SELF, "slope from a start of 0.3 mrad, relative", 2e-4, apart))
-        rows.append(_seen(found, f"pair, {torque}"))
+        rows.append(_seen(state, f"pair, {torque}"))
     axle = solve_deflection(read_case("cases/e_axle.toml"))
     count = len(axle.slopes) - 1
     rows.append(at_most("electric axle", SELF, "passes until slopes agree to 1e-4", 5, count))
@@ -187,12 +187,12 @@ def passes() -> tuple[Row, ...]:
     return tuple(rows)
 
 
-def _seen(found: Deflection, name: str) -> Row:
+def _seen(state: Deflection, name: str) -> Row:
     """Largest difference of the misalignment that contact and system have, over the load's own approach."""
     worst = 0.0
-    for stage in found.model.stages:
-        if stage.name in found.contacts:
-            rise = found.contacts[stage.name].result.cycle.mesh_misalignment.mean(axis=1)
-            slope = found.slopes[-2][list(stage.meshes)] * stage.width / math.cos(stage.sizes.base_helix)
+    for stage in state.model.stages:
+        if stage.name in state.contacts:
+            rise = state.contacts[stage.name].result.cycle.mesh_misalignment.mean(axis=1)
+            slope = state.slopes[-2][list(stage.meshes)] * stage.width / math.cos(stage.sizes.base_helix)
             worst = max(worst, float(np.abs(rise - slope).max() / max(np.abs(slope).max(), 1e-9)))
     return at_most(name, SELF, "misalignment of contact and of system, relative", 1e-3, worst)

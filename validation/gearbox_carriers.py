@@ -40,9 +40,9 @@ Rotate {{{{0, 0, 1}}, {{0, 0, 0}}, {turn}}} {{ Volume{{{n} + 40}}; }}
 """
 
 
-def _planets(found: Deflection) -> np.ndarray:
+def _planets(state: Deflection) -> np.ndarray:
     """Motions (N, 6) of the planets [m, rad]."""
-    return np.array([found.motion[6 * one : 6 * one + 6] for one in found.model.stages[0].planets])
+    return np.array([state.motion[6 * station : 6 * station + 6] for station in state.model.stages[0].planets])
 
 
 def _frequencies(case: Any) -> np.ndarray:
@@ -79,11 +79,11 @@ def _beam_rows(entries: dict[str, Any], of: Callable[[dict[str, np.ndarray]], di
     pins = {"diameter": "20 mm", "length": f"{HALF!r} m"}
     closed = solve_deflection(case({"wind_up_stiffness": "3e5 N m/rad"}, pins=pins))
     body = of(arrays)
-    found = solve_deflection(case(body))
+    state = solve_deflection(case(body))
     size = np.abs(_planets(closed)).max()
-    apart = np.abs(_planets(found) - _planets(closed)).max() / size
+    apart = np.abs(_planets(state) - _planets(closed)).max() / size
     yield at_most(name, "femgear, closed forms", "motions of the planets, difference over the largest", LARGEST, apart)
-    yield at_most(name, "equilibrium", "force out of balance over the largest", LARGEST, found.residual)
+    yield at_most(name, "equilibrium", "force out of balance over the largest", LARGEST, state.residual)
     whole = solve_deflection(with_value(case(body), "modes.up_to", "200 kHz"))
     expected = unreduced_frequencies(whole, arrays)
     ours = solve_gearbox_modes(whole).modes.frequency
@@ -166,9 +166,9 @@ def wind_up() -> tuple[Row, ...]:
 
 def drum() -> tuple[Row, ...]:
     """The stage of cases/planet_carrier.toml, with the teeth."""
-    found = solve_deflection(read_case("cases/planet_carrier.toml"))
+    state = solve_deflection(read_case("cases/planet_carrier.toml"))
     name = "planetary stage, drum carrier"
     return (
-        at_most(name, "equilibrium", "force out of balance over the largest", LARGEST, found.residual),
-        at_most(name, SELF, "passes until slopes agree to 1e-4", 5, len(found.slopes) - 1),
+        at_most(name, "equilibrium", "force out of balance over the largest", LARGEST, state.residual),
+        at_most(name, SELF, "passes until slopes agree to 1e-4", 5, len(state.slopes) - 1),
     )

@@ -83,7 +83,7 @@ class TwoStages:
 
     Parameters
     ----------
-    found : Deflection
+    state : Deflection
         Loaded state.
     response : GearboxResponse
         At the speeds.
@@ -95,7 +95,7 @@ class TwoStages:
         Mesh frequencies over their common one.
     """
 
-    found: Deflection
+    state: Deflection
     response: GearboxResponse
     stages: tuple[RunningStage, ...]
     structure: MeshedStructure
@@ -103,7 +103,7 @@ class TwoStages:
 
     def base(self, i: int) -> float:
         """Common mesh frequency at a speed by its number [rad/s]."""
-        flow = self.found.model.flow
+        flow = self.state.model.flow
         ratio = self.response.speed[i] / abs(flow.speed[self.response.reference])
         return 2.0 * math.pi * flow.mesh_frequency["stage"] * ratio / self.multiples[0]
 
@@ -129,15 +129,15 @@ class TwoStages:
 def solve_two_stages(teeth: tuple[int, int], speeds: Sequence[float] = SPEEDS) -> TwoStages:
     """Solve a first pair of 24/36 and a second one with its teeth at speeds of the input shaft [rpm]."""
     steps = Steps()
-    found = solve_deflection(read_case(two_pairs(teeth)), steps=steps)
+    state = solve_deflection(read_case(two_pairs(teeth)), steps=steps)
     stages = [
-        running_stage(found, stage, stage_excitation(found.contacts[stage.name], steps=steps)).running
-        for stage in found.model.stages
+        running_stage(state, stage, stage_excitation(state.contacts[stage.name], steps=steps)).running
+        for stage in state.model.stages
     ]
-    response = solve_gearbox_response(found, RPM * np.array(speeds), steps=steps)
-    system, loss = linear_system(found)[1], 2.0 * found.model.case.modes.damping_ratio
+    response = solve_gearbox_response(state, RPM * np.array(speeds), steps=steps)
+    system, loss = linear_system(state)[1], 2.0 * state.model.case.modes.damping_ratio
     structure = MeshedStructure(system.M, system.K, system.W, loss)
-    return TwoStages(found, response, tuple(stages), structure, SECOND[teeth])
+    return TwoStages(state, response, tuple(stages), structure, SECOND[teeth])
 
 
 def left_out(pairs: TwoStages, i: int) -> Iterator[LeftOut]:
@@ -159,14 +159,14 @@ def apart_alone(pairs: TwoStages, a: int, i: int) -> float:
     signals = pairs.signals(i).without([1 - a])
     middle = signals.stiffness.shape[1] // 2
     mean = signals.stiffness.copy()
-    mean[1 - a, middle] = linear_system(pairs.found)[2][1 - a]
+    mean[1 - a, middle] = linear_system(pairs.state)[2][1 - a]
     wanted = pairs.mesh_forces(replace(signals, stiffness=mean), i)[0][a, middle:]
     multiple = pairs.multiples[a]
-    known = {"harmonics": (int(pairs.response.stages[a].harmonics[i]), middle // multiple), "tolerance": 1e-13}
-    force = solve_running(pairs.stages[a], multiple * pairs.base(i), 0.0, side_bands=0, **known).force[0, 0, :, 0]
-    met = np.zeros(middle + 1, complex)
-    met[: multiple * len(force) : multiple] = force
-    return float(np.abs(met - wanted)[1:].max() / np.abs(force[1:]).max())
+    options = {"harmonics": (int(pairs.response.stages[a].harmonics[i]), middle // multiple), "tolerance": 1e-13}
+    force = solve_running(pairs.stages[a], multiple * pairs.base(i), 0.0, side_bands=0, **options).force[0, 0, :, 0]
+    coefficients = np.zeros(middle + 1, complex)
+    coefficients[: multiple * len(force) : multiple] = force
+    return float(np.abs(coefficients - wanted)[1:].max() / np.abs(force[1:]).max())
 
 
 def two_stages() -> tuple[Row, ...]:
@@ -175,15 +175,15 @@ def two_stages() -> tuple[Row, ...]:
     for teeth, multiples in SECOND.items():
         name = f"24/36 and {teeth[0]}/{teeth[1]}, mesh frequencies {multiples[0]}:{multiples[1]}"
         pairs = solve_two_stages(teeth)
-        known = [case for i in range(len(SPEEDS)) for case in left_out(pairs, i)]
+        cases = [case for i in range(len(SPEEDS)) for case in left_out(pairs, i)]
         text = "a stage alone: lines of its mesh force, largest difference over the largest"
-        rows.append(at_most(name, AT_ONCE, text, 1e-9, max(case.alone for case in known)))
+        rows.append(at_most(name, AT_ONCE, text, 1e-9, max(case.alone for case in cases)))
         text = "force left out, estimate over exact, binary logarithm, largest of 8 speeds and both stages"
-        rows.append(at_most(name, AT_ONCE, text, 1.0, max((math.log2(case.estimate) for case in known), key=abs)))
+        rows.append(at_most(name, AT_ONCE, text, 1.0, max((math.log2(case.estimate) for case in cases), key=abs)))
         text = "estimate over r.m.s. of the mesh force, largest"
-        rows.append(information(name, AT_ONCE, text, None, max(case.share for case in known)))
+        rows.append(information(name, AT_ONCE, text, None, max(case.share for case in cases)))
         text = "change of the r.m.s. of the mesh force, both at once beside one after the other, largest"
-        rows.append(information(name, AT_ONCE, text, None, max((case.level for case in known), key=abs)))
+        rows.append(information(name, AT_ONCE, text, None, max((case.level for case in cases), key=abs)))
     return tuple(rows)
 
 
@@ -202,7 +202,7 @@ def estimates_of_phases(pairs: TwoStages, i: int, a: int) -> tuple[float, np.nda
     exact = []
     for number in range(PHASES):
         signals = mounted_ahead(pairs.signals(i), number / PHASES / math.prod(pairs.multiples))
-        pressed, alone = (pairs.mesh_forces(one, i)[1][a] for one in (signals, signals.without([1 - a])))
+        pressed, alone = (pairs.mesh_forces(left, i)[1][a] for left in (signals, signals.without([1 - a])))
         exact.append(rms(pressed - alone))
     share = float(pairs.response.cross_excitation[i, a, 1 - a])
     return share * pairs.response.dynamic_forces[i, a, 0], np.array(exact)
@@ -214,12 +214,16 @@ def any_phase() -> tuple[Row, ...]:
     for teeth, multiples in [*SECOND.items()][:2]:
         name = f"24/36 and {teeth[0]}/{teeth[1]}, mesh frequencies {multiples[0]}:{multiples[1]}"
         pairs = solve_two_stages(teeth, MORE_SPEEDS)
-        known = [estimates_of_phases(pairs, i, a) for i in range(len(MORE_SPEEDS)) for a in (0, 1)]
-        every = [math.log2(estimate / rms_over(exact)) for estimate, exact in known]
+        estimates = [estimates_of_phases(pairs, i, a) for i in range(len(MORE_SPEEDS)) for a in (0, 1)]
+        every = [math.log2(estimate / rms_over(exact)) for estimate, exact in estimates]
         text = f"force left out, estimate over exact, binary logarithm, r.m.s. over phases, largest of {len(every)}"
         rows.append(at_most(name, AT_ONCE, text, 1.0, max(every, key=abs)))
         text = f"the same for one phase, lowest of {PHASES * len(every)}"
-        rows.append(information(name, AT_ONCE, text, None, min(math.log2(one / most.max()) for one, most in known)))
+        rows.append(
+            information(
+                name, AT_ONCE, text, None, min(math.log2(estimated / most.max()) for estimated, most in estimates)
+            )
+        )
     return tuple(rows)
 
 

@@ -84,8 +84,8 @@ def _set() -> tuple[Row, ...]:
     modes = undamped_modes(reference.model.system, reference.excitation.stiffness.mean(axis=1), damping_ratio=0.0)
     excitation, rows = balanced_source(reference.excitation, modes), list[Row]()
     for hertz in (300.0, 1500.0, 2300.0):
-        known = {"excitation_harmonics": 8, "response_harmonics": 12, "method": "direct"}
-        wanted = solve_spectral(modes, excitation, np.array([hertz]), **known).force[0][[0, len(stage.planets)], 1:]
+        options = {"excitation_harmonics": 8, "response_harmonics": 12, "method": "direct"}
+        wanted = solve_spectral(modes, excitation, np.array([hertz]), **options).force[0][[0, len(stage.planets)], 1:]
         response = solve_running(running, 2.0 * np.pi * hertz, 0.0, harmonics=(8, 12), side_bands=0, tolerance=1e-13)
         apart = np.abs(2.0 * response.force[0, :2, 1:, 0] - wanted).max() / np.abs(wanted).max()
         text = f"mesh forces, mesh frequency {hertz:g} Hz, over the largest"

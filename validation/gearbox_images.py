@@ -18,9 +18,9 @@ def images() -> tuple[Row, ...]:
     worst: dict[str, float] = defaultdict(float)
     for seed in range(_COUNT):
         tables = random_gearbox(seed, 2)
-        found = solve_deflection(read_case(tables))
+        state = solve_deflection(read_case(tables))
         for name in IMAGES:
-            worst[name] = max(worst[name], *unlike(tables, found, name, seed).values())
+            worst[name] = max(worst[name], *unlike(tables, state, name, seed).values())
     text = "forces, motions and natural frequencies, largest difference over the largest"
     return tuple(
         at_most(f"{_COUNT} random gearboxes", "the same gearbox", f"{name}: {text}", 1e-9, apart)

@@ -41,14 +41,14 @@ def orders_of(response: RunningResponse, shape: np.ndarray, count: int) -> np.nd
 
     The mesh frequency is a multiple of the speed of the carrier; lines of one order add.
     """
-    found = np.zeros((shape.shape[1], count), complex)
+    coefficients = np.zeros((shape.shape[1], count), complex)
     order = np.rint(response.frequency / response.carrier_speed).astype(int)
     amplitude = response.lines(shape)
     for (line, band), number in np.ndenumerate(order):
         if abs(number) < count:
             value = amplitude[line, band]
-            found[:, abs(number)] += value if number >= 0 else value.conj()
-    return found
+            coefficients[:, abs(number)] += value if number >= 0 else value.conj()
+    return coefficients
 
 
 def apart_in_time(turning: TurningSystem, stage: RunningStage, shape: np.ndarray) -> float:
@@ -58,10 +58,10 @@ def apart_in_time(turning: TurningSystem, stage: RunningStage, shape: np.ndarray
     """
     motion = motion_over_a_turn(turning, SAMPLES)[: shape.shape[1]]
     wanted = 2.0 * np.fft.rfft(motion, axis=1)[:, : SAMPLES // 2] / SAMPLES
-    known = {"harmonics": (turning.harmonics, 14), "side_bands": 6, "tolerance": 1e-13}
-    response = solve_running(stage, turning.teeth * turning.speed, turning.speed, **known)
-    met = orders_of(response, shape, SAMPLES // 2)
-    return float(np.abs(met - wanted)[:, 1:].max() / np.abs(wanted[:, 1:]).max())
+    options = {"harmonics": (turning.harmonics, 14), "side_bands": 6, "tolerance": 1e-13}
+    response = solve_running(stage, turning.teeth * turning.speed, turning.speed, **options)
+    lines = orders_of(response, shape, SAMPLES // 2)
+    return float(np.abs(lines - wanted)[:, 1:].max() / np.abs(wanted[:, 1:]).max())
 
 
 def in_time() -> tuple[Row, ...]:
@@ -96,16 +96,16 @@ def helical_stage(angle: float, *, back: bool) -> Deflection:
 
 def turning_stage(*, back: bool) -> tuple[TurningSystem, RunningStage, np.ndarray]:
     """Helical stage in axes at rest, as the response takes it, and the modes (m, 18) of sun, carrier and casing."""
-    found = helical_stage(ANGLE, back=back)
-    box, assembly = found.model.stages[0], found.model.assembly
-    structured = running_stage(found, box, synthetic_excitation(found, box))
+    state = helical_stage(ANGLE, back=back)
+    box, assembly = state.model.stages[0], state.model.assembly
+    structured = running_stage(state, box, synthetic_excitation(state, box))
     single, motion = structured.running, structured.motion
     frequency = single.natural_frequency
     ratio = 0.5 * (BY_MASS / frequency + BY_STIFFNESS * frequency)
     viscous = np.append(np.zeros(single.kinds), PIN_DAMPING)
     undamped = {"loss": 0.0 * single.loss, "structure_loss": 0.0}
     single = replace(single, damping_ratio=ratio, viscous=viscous, **undamped)
-    _, structure, _ = structure_without(found, box)
+    _, structure, _ = structure_without(state, box)
     size, count = len(structure.M), len(box.planets)
     damping, stiffness = np.zeros((2, assembly.count, assembly.count))
     stiffness[:size, :size] = structure.K
@@ -127,7 +127,7 @@ def turning_stage(*, back: bool) -> tuple[TurningSystem, RunningStage, np.ndarra
         return np.vstack([there.columns.T, *pins])
 
     springs = np.tile(single.stiffness[single.kinds :], count), np.tile(PIN_DAMPING, count)
-    speed, teeth = abs(found.model.flow.speed["carrier"]), single.paths.z_ring
+    speed, teeth = abs(state.model.flow.speed["carrier"]), single.paths.z_ring
     drive = single.excitation
     turning = TurningSystem(rows, assembly.mass, damping, stiffness, *springs, drive, teeth, speed, 2)
     return turning, single, motion[:size].T

@@ -59,13 +59,13 @@ def pairs() -> tuple[Row, ...]:
         mean, ratio = drive.stiffness.mean(axis=1), case.dynamics.damping_ratio
         model = pair_model(case, planetary_set(case))
         modes = undamped_modes(model.system, mean, damping_ratio=ratio)
-        found = solve_deflection(read_case(pair_of_rigid_gears_tables(case, float(mean[0]))))
-        box = nonlinear_gearbox(found, {"pair": drive}, harmonics=8, damping_ratio=ratio)
+        state = solve_deflection(read_case(pair_of_rigid_gears_tables(case, float(mean[0]))))
+        box = nonlinear_gearbox(state, {"pair": drive}, harmonics=8, damping_ratio=ratio)
         omega, options = 2.0 * np.pi * share * modes.frequency.max(), {"harmonics": 24, "stability": False}
         wanted = solve_harmonic_balance(separating_pair(model, modes, drive, 8), omega, **options).force[0]
         lines = solve_harmonic_balance(box.problem, omega, **options).force
-        met = lines[0] - (lines[1] if len(lines) > 1 else 0.0)
-        apart = np.abs(met - wanted).max() / np.abs(wanted).max()
+        deflection = lines[0] - (lines[1] if len(lines) > 1 else 0.0)
+        apart = np.abs(deflection - wanted).max() / np.abs(wanted).max()
         rows.append(at_most(name, PAIR, "lines of the mesh force, largest difference over the largest", 1e-9, apart))
     return tuple(rows)
 
@@ -107,35 +107,35 @@ def wave_of_stiffness(data: PlanarSet, backlash: float) -> MeshExcitation:
 def flank_forces(problem: NonlinearSystem, solution: PeriodicSolution, times: np.ndarray) -> np.ndarray:
     """Forces (instants, flanks) of drive flanks, then of back flanks, of the first elements of a system [N]."""
     theta, x = times[:, None] * solution.frequency, solution.at(times)
-    found = list[np.ndarray]()
+    differences = list[np.ndarray]()
     for element in problem.elements[:2]:
         force = element.evaluate(x[:, element.columns], theta)[0]
         if hasattr(element, "forces"):
             force = element.forces(x[:, element.columns], theta)[..., None]
-        found.append(force[..., 0])
-    return np.hstack(found)
+        differences.append(force[..., 0])
+    return np.hstack(differences)
 
 
-def without_pull(found: Deflection, box: NonlinearGearbox) -> MechanicalSystem:
+def without_pull(state: Deflection, box: NonlinearGearbox) -> MechanicalSystem:
     """System without the pull of the pins on turning planets."""
-    assembly = planets_of(found)
-    pull = centrifugal_pull(assembly, turning(found), assembly.mass)
+    assembly = planets_of(state)
+    pull = centrifugal_pull(assembly, turning(state), assembly.mass)
     system = box.problem.system
     return replace(system, K=system.K - box.motion.T @ pull @ box.motion)
 
 
-def turning(found: Deflection) -> TurningPlanets:
+def turning(state: Deflection) -> TurningPlanets:
     """Planets of the first stage, which go round."""
-    planets = planets_of_stage(found.model, found.model.stages[0])
+    planets = planets_of_stage(state.model, state.model.stages[0])
     assert planets is not None
     return planets
 
 
-def planets_of(found: Deflection) -> Assembly:
+def planets_of(state: Deflection) -> Assembly:
     """Assembly with the inertias of the planets alone."""
-    model = found.model
-    own = tuple(one for one in model.assembly.inertias if one.stations[0] in model.stages[0].planets)
-    return replace(model.assembly, inertias=own)
+    model = state.model
+    of_planets = tuple(inertia for inertia in model.assembly.inertias if inertia.stations[0] in model.stages[0].planets)
+    return replace(model.assembly, inertias=of_planets)
 
 
 def planar_sets() -> tuple[Row, ...]:
@@ -148,13 +148,13 @@ def planar_sets() -> tuple[Row, ...]:
         tables = set_tables(data, TEETH) | {"gravity": {"acceleration": f"{weight} m/s^2"}}
         speed = {"set carrier": f"{turn!r} rad/s"} | ({"set sun": "9 rad/s"} if parts else {"set ring": "0 rpm"})
         tables["operation"]["load_case"] = [{"torque": {"set sun": f"{torque} N m"}, "speed": speed}]
-        found = solve_deflection(read_case(tables))
+        state = solve_deflection(read_case(tables))
         ratio = RATIO if parts else 0.0
-        box = nonlinear_gearbox(found, {"set": drive}, harmonics=4, damping_ratio=ratio, separates=parts)
-        known = {"separates": parts, "backlash": drive.backlash, "harmonics": 4, "orders": (0, 1)}
+        box = nonlinear_gearbox(state, {"set": drive}, harmonics=4, damping_ratio=ratio, separates=parts)
+        flank_options = {"separates": parts, "backlash": drive.backlash, "harmonics": 4, "orders": (0, 1)}
         wanted = gear_set_problem(
             data,
-            meshes=mesh_elements(data, stiffness=drive, **known),
+            meshes=mesh_elements(data, stiffness=drive, **flank_options),
             back_flanks=parts,
             torque=PlanarTorque(torque, "sun", "carrier"),
             gravity=Gravity(weight, -0.5 * np.pi, None if parts else (1, 0)),
@@ -165,7 +165,7 @@ def planar_sets() -> tuple[Row, ...]:
         orders, options = side_bands(bands, 10, bands), {"stability": False, "radius": False, "tolerance": 1e-12}
         samples = (1, 2048) if parts else None
         reference = solve_harmonic_balance(wanted, [turn or 1.0, mesh], orders=orders, samples=samples, **options)
-        problem = replace(box.problem, system=without_pull(found, box) if turn else box.problem.system)
+        problem = replace(box.problem, system=without_pull(state, box) if turn else box.problem.system)
         orders, samples = (orders[:, 1:], 2048) if parts else (orders, None)
         frequency = [mesh] if parts else [turn, mesh]
         solution = solve_harmonic_balance(problem, frequency, orders=orders, samples=samples, **options)
@@ -177,16 +177,16 @@ def planar_sets() -> tuple[Row, ...]:
     return tuple(rows)
 
 
-def apart_from_response(found: Deflection) -> float:
+def apart_from_response(state: Deflection) -> float:
     """Largest difference of the lines of all motions but those of planets from the response, over the largest."""
-    stage = found.model.stages[0]
-    drive = synthetic_excitation(found, stage)
-    structured = running_stage(found, stage, drive)
-    known = {"harmonics": 2, "damping_ratio": 0.0, "separates": False, "gyroscopic": False}
-    box = nonlinear_gearbox(found, {stage.name: drive}, **known)
+    stage = state.model.stages[0]
+    drive = synthetic_excitation(state, stage)
+    structured = running_stage(state, stage, drive)
+    options = {"harmonics": 2, "damping_ratio": 0.0, "separates": False, "gyroscopic": False}
+    box = nonlinear_gearbox(state, {stage.name: drive}, **options)
     # the response is about the mean state
     mean = box.stages[0].excitation.force.mean(axis=1) @ box.stages[0].drive.fixed
-    problem = replace(box.problem, system=replace(without_pull(found, box), load=mean))
+    problem = replace(box.problem, system=replace(without_pull(state, box), load=mean))
     turn, mesh = box.frequency
     orders = side_bands(6, 3, 6)
     solution = solve_harmonic_balance(problem, box.frequency, orders=orders, stability=False, radius=False)
@@ -246,27 +246,27 @@ def turned_approaches(speed: float, *, back: bool = False):
 
 def apart_at_rest(speed: float, turns: float = 0.04) -> tuple[float, float, float]:
     """Difference from the motion in axes at rest over the motion, and shares of time: drive apart, back in touch."""
-    found = heavy_set(ANGLE, speed)
-    stage, assembly = found.model.stages[0], found.model.assembly
-    drive = synthetic_excitation(found, stage)
+    deflected = heavy_set(ANGLE, speed)
+    stage, assembly = deflected.model.stages[0], deflected.model.assembly
+    drive = synthetic_excitation(deflected, stage)
     changes = {"force": 0.0 * drive.force, "deflection": 3.0 * drive.deflection, "backlash": np.full(6, 4e-6)}
     drive = replace(drive, **changes)
-    box = nonlinear_gearbox(found, {stage.name: drive}, harmonics=2, damping_ratio=0.0)
-    T, turn = box.motion, found.model.flow.speed["carrier"]
-    system = without_pull(found, box)
+    box = nonlinear_gearbox(deflected, {stage.name: drive}, harmonics=2, damping_ratio=0.0)
+    T, turn = box.motion, deflected.model.flow.speed["carrier"]
+    system = without_pull(deflected, box)
     at = [assembly.motion_names.index(name) for name in system.dofs]
     planets = np.array(["planet" in name for name in system.dofs])
     damping = 150.0 * np.where(planets[:, None] | planets, 0.0, system.M)
     problem = replace(box.problem, system=replace(system, C=system.C + damping))
-    start = np.linalg.lstsq(T, found.motion, rcond=None)[0]
+    start = np.linalg.lstsq(T, deflected.motion, rcond=None)[0]
     times = np.linspace(0.0, turns * 2.0 * np.pi / abs(turn), 200)
-    known = {"start": (start, 0.0 * start), "method": "DOP853", "tolerance": 1e-10}
-    motion = solve_transient(problem, box.frequency, times, **known)
+    options = {"start": (start, 0.0 * start), "method": "DOP853", "tolerance": 1e-10}
+    motion = solve_transient(problem, box.frequency, times, **options)
     held, other = turned_approaches(speed), turned_approaches(speed, back=True)
-    pins = [one for one in assembly.springs if one.name.startswith("pins")]
-    springs = np.concatenate([one.stiffness[np.isfinite(one.stiffness)] for one in pins])
-    rest = replace(assembly, springs=tuple(one for one in assembly.springs if one not in pins))
-    M, K, load = assembly.mass[np.ix_(at, at)], rest.stiffness[np.ix_(at, at)], found.model.load[at]
+    pins = [spring for spring in assembly.springs if spring.name.startswith("pins")]
+    springs = np.concatenate([pin.stiffness[np.isfinite(pin.stiffness)] for pin in pins])
+    rest = replace(assembly, springs=tuple(spring for spring in assembly.springs if spring not in pins))
+    M, K, load = assembly.mass[np.ix_(at, at)], rest.stiffness[np.ix_(at, at)], deflected.model.load[at]
     inverse, excitation = np.linalg.inv(M), box.stages[0].excitation
     series = [np.fft.rfft(getattr(excitation, name), axis=1)[:, :3] for name in ("stiffness", "deflection")]
     omega, positions = box.frequency[1], excitation.stiffness.shape[1]
@@ -282,10 +282,10 @@ def apart_at_rest(speed: float, turns: float = 0.04) -> tuple[float, float, floa
         return np.concatenate([v, inverse @ (force - rows[6:].T @ (springs * (rows[6:] @ q)))])
 
     whole = T @ start
-    begin = np.concatenate([whole[at], turn * (wave_generator(turning(found), assembly.count) @ whole)[at]])
+    begin = np.concatenate([whole[at], turn * (wave_generator(turning(deflected), assembly.count) @ whole)[at]])
     twin = solve_ivp(rate, (0.0, times[-1]), begin, method="DOP853", t_eval=times, rtol=1e-10, atol=1e-16)
-    wanted, met = twin.y[: len(at)][~planets], (T @ motion.displacement.T)[at][~planets]
-    apart = np.abs(met - wanted).max() / np.abs(wanted - wanted[:, :1]).max()
+    wanted, reached = twin.y[: len(at)][~planets], (T @ motion.displacement.T)[at][~planets]
+    apart = np.abs(reached - wanted).max() / np.abs(wanted - wanted[:, :1]).max()
     theta = times[:, None] * box.frequency
     shares = []
     for element in box.flanks[0]:
@@ -318,12 +318,12 @@ def loose_carrier() -> tuple[Row, ...]:
     )
     speed = {"set carrier": f"{turn} rad/s", "set ring": "0 rpm"}
     tables["operation"]["load_case"] = [{"torque": {"set sun": "100 N m"}, "speed": speed}]
-    found = solve_deflection(read_case(tables))
-    box = nonlinear_gearbox(found, {"set": drive}, harmonics=4, damping_ratio=0.0, separates=False)
-    known = {"separates": False, "backlash": drive.backlash, "harmonics": 4, "orders": (0, 1)}
+    state = solve_deflection(read_case(tables))
+    box = nonlinear_gearbox(state, {"set": drive}, harmonics=4, damping_ratio=0.0, separates=False)
+    flank_options = {"separates": False, "backlash": drive.backlash, "harmonics": 4, "orders": (0, 1)}
     wanted = gear_set_problem(
         data,
-        meshes=mesh_elements(data, stiffness=drive, **known),
+        meshes=mesh_elements(data, stiffness=drive, **flank_options),
         torque=PlanarTorque(100.0, "sun", "carrier"),
         gravity=Gravity(weight, -0.5 * np.pi, (1, 0)),
         carrier_speed=turn,
@@ -331,14 +331,14 @@ def loose_carrier() -> tuple[Row, ...]:
     )
     orders = side_bands(10, 6, 10)
     options: dict[str, Any] = {"orders": orders, "stability": False, "radius": False, "samples": (128, 64)}
-    problem = replace(box.problem, system=without_pull(found, box))
+    problem = replace(box.problem, system=without_pull(state, box))
     start = loaded_lines(box, len(orders))
     ours = solve_harmonic_balance(problem, [turn, mesh], start=start, tolerance=1e-12, **options)
     reference = solve_harmonic_balance(wanted, [turn, mesh], tolerance=1e-12, **options)
     times = np.linspace(0.0, 2.0 * np.pi / turn, 701)
     meshes = [
-        flank_forces(replace(one, elements=one.elements[:1]), solution, times)
-        for one, solution in ((problem, ours), (wanted, reference))
+        flank_forces(replace(of_problem, elements=of_problem.elements[:1]), solution, times)
+        for of_problem, solution in ((problem, ours), (wanted, reference))
     ]
     apart = np.abs(meshes[0] - meshes[1]).max() / np.abs(meshes[1]).max()
     # the planar set moves in axes that turn with its carrier
@@ -355,11 +355,11 @@ def loose_carrier() -> tuple[Row, ...]:
 
 def loose_pair() -> tuple[Row, ...]:
     """Two rigid gears under weight, one in a bearing that carries nothing for half of the time."""
-    found = solve_deflection(read_case(loose_pair_tables("20 um", weight="28 kg")))
-    drive = excitation_of(found, found.model.stages[0])
+    state = solve_deflection(read_case(loose_pair_tables("20 um", weight="28 kg")))
+    drive = excitation_of(state, state.model.stages[0])
     error = 5e-6 * np.cos(2.0 * np.pi * np.arange(drive.deflection.shape[1]) / drive.deflection.shape[1])
     drive = replace(drive, deflection=drive.deflection + error)
-    box = nonlinear_gearbox(found, {"stage": drive}, harmonics=2, damping_ratio=0.05, separates=False)
+    box = nonlinear_gearbox(state, {"stage": drive}, harmonics=2, damping_ratio=0.05, separates=False)
     omega, harmonics = 2.0 * np.pi * 250.0, 64
     options = {"harmonics": harmonics, "samples": 8192, "stability": False, "radius": False}
     solution = solve_harmonic_balance(box.problem, omega, **options)

@@ -50,9 +50,9 @@ def places() -> list[Row]:
         draw, agreed = random.Random(f"rows {kind}"), 0
         for _ in range(100):
             gears = random_set(draw, kind)
-            step, found = assembly_step(gears), places_by_trial(gears)
+            step, places = assembly_step(gears), places_by_trial(gears)
             every = np.arange(step.denominator) / step.denominator
-            agreed += len(found) == len(every) and bool(np.abs(found - every).max() < 1e-9)
+            agreed += len(places) == len(every) and bool(np.abs(places - every).max() < 1e-9)
         text = "random sets whose places are found"
         rows.append(counted(f"{kind} sets", "planets rolled around, all teeth tried", text, 100, agreed))
     return rows
@@ -72,21 +72,21 @@ def kinematics() -> list[Row]:
             flow = power_flow(shafts, conditions, speeds=given, torques={}, outputs=central[1:])
             by_teeth = free_speeds(gears, start)
             ratios = [flow.speed_ratio[shaft] for shaft in central]
-            turned = [sum(share * start[shaft] for shaft, share in one.items()) for one in ratios]
+            turned = [sum(share * start[shaft] for shaft, share in ratio_of_shaft.items()) for ratio_of_shaft in ratios]
             agreed += turned == [by_teeth[shaft] for shaft in central]
         text = "random sets whose speeds agree, in fractions"
         rows.append(counted(f"{kind} sets", "teeth that pass in every mesh (Willis)", text, 40, agreed))
     return rows
 
 
-def forces_at_once(found: Deflection) -> np.ndarray:
+def forces_at_once(state: Deflection) -> np.ndarray:
     """Mesh forces (M,) of the linear gearbox, whose equations are solved at once and improved once."""
-    assembly = found.model.assembly
+    assembly = state.model.assembly
     held = assembly.held.copy()
-    held[found.model.turns] = True
+    held[state.model.turns] = True
     motions, columns = replace(assembly, held=held).motions, assembly.columns
     inner = assembly.stiffness + (columns * assembly.slice_stiffness) @ columns.T
-    reduced, load = motions.T @ inner @ motions, motions.T @ found.model.load
+    reduced, load = motions.T @ inner @ motions, motions.T @ state.model.load
     moved = np.linalg.solve(reduced, load)
     moved += np.linalg.solve(reduced, load - reduced @ moved)
     force = assembly.slice_stiffness * (columns.T @ motions @ moved)
@@ -97,21 +97,23 @@ def simple_planets() -> list[Row]:
     """Planets as shafts against the planets of a planetary stage."""
     rows = []
     for motions in ("space", "plane", "rotation"):
-        own, known = (solve_deflection(read_case(make(motions=motions))) for make in (simple_set, known_set))
-        force = np.abs(own.mesh_force / known.mesh_force - 1.0).max()
+        as_shafts, as_stage = (solve_deflection(read_case(make(motions=motions))) for make in (simple_set, known_set))
+        force = np.abs(as_shafts.mesh_force / as_stage.mesh_force - 1.0).max()
         rows.append(at_most(f"27/39/105, {motions}", STAGE, "mesh forces, largest relative difference", 1e-9, force))
-        force = np.abs(forces_at_once(own) / forces_at_once(known) - 1.0).max()
+        force = np.abs(forces_at_once(as_shafts) / forces_at_once(as_stage) - 1.0).max()
         text = "mesh forces of linear statics, largest relative difference"
         rows.append(at_most(f"27/39/105, {motions}", STAGE, text, 1e-12, force, note=DIRECTLY))
-        one, other = (solve_gearbox_modes(found).modes.frequency for found in (own, known))
-        away = np.abs(one - other).max() / other.max()
+        ours, other = (solve_gearbox_modes(state).modes.frequency for state in (as_shafts, as_stage))
+        away = np.abs(ours - other).max() / other.max()
         rows.append(at_most(f"27/39/105, {motions}", STAGE, "frequencies over the highest", 1e-9, away))
     for fixed, torque in (("carrier", 100.0), ("carrier", -80.0), ("ring", 100.0), ("ring", -80.0), ("sun", 90.0)):
-        own, known = (
+        as_shafts, as_stage = (
             outer_lines(make, fixed=fixed, torque=torque, motions="space") for make in (simple_set, known_set)
         )
         text = "lines of sensors, bearings and feet in a casing on uneven feet, k(t) of 30 %, over the largest of each"
-        rows.append(at_most(f"28/38/104, {fixed} stands, {torque:g} N m", STAGE, text, 1e-9, lines_apart(own, known)))
+        rows.append(
+            at_most(f"28/38/104, {fixed} stands, {torque:g} N m", STAGE, text, 1e-9, lines_apart(as_shafts, as_stage))
+        )
     return rows
 
 
@@ -123,9 +125,9 @@ def parting_planets() -> list[Row]:
             solve_balance(parting_set(make, fixed=fixed, torque=torque)) for make in (simple_set, known_set)
         )
         forces = np.abs(shafts.drive - stage.drive).max() / stage.drive.max()
-        heard = np.abs(shafts.acceleration - stage.acceleration).max() / np.abs(stage.acceleration).max()
+        difference = np.abs(shafts.acceleration - stage.acceleration).max() / np.abs(stage.acceleration).max()
         case, apart = f"28/38/104, {fixed} stands, {torque:g} N m", f"The least force is {stage.drive.min():.3g} N."
-        for text, away in (("forces of drive flanks", forces), ("lines of sensors", heard)):
+        for text, away in (("forces of drive flanks", forces), ("lines of sensors", difference)):
             rows.append(at_most(case, STAGE, f"harmonic balance: {text}, over the largest", 1e-9, away, note=apart))
     return rows
 
@@ -133,17 +135,17 @@ def parting_planets() -> list[Row]:
 def stepped_planets() -> list[Row]:
     """Stepped planets of unequal meshes against springs set up by hand."""
     stiffness = (4e8, 4.4e8, 3.6e8, 3e8, 3.1e8, 2.8e8)
-    found = solve_deflection(read_case(stepped_set(stiffness=stiffness)))
+    state = solve_deflection(read_case(stepped_set(stiffness=stiffness)))
     mass, k, rows = springs_by_hand(stiffness)
     load, motion = np.zeros(18), np.zeros(18)
     load[2], load[5] = 100.0, -100.0 * (1.0 + 57 * 108 / (24 * 27))
     kept = [i for i in range(18) if i not in (2, 8)]
     motion[kept] = np.linalg.solve(k[np.ix_(kept, kept)], load[kept])
     by_hand = np.array(stiffness) * (rows @ motion)
-    force, linear = (np.abs(own / by_hand - 1.0).max() for own in (found.mesh_force, forces_at_once(found)))
+    force, linear = (np.abs(forces / by_hand - 1.0).max() for forces in (state.mesh_force, forces_at_once(state)))
     free = np.ix_(*[[i for i in range(18) if i != 8]] * 2)
     hertz = np.sqrt(np.maximum(eigh(k[free], mass[free], eigvals_only=True), 0.0)) / (2.0 * math.pi)
-    away = np.abs(solve_gearbox_modes(found).modes.frequency - hertz).max() / hertz.max()
+    away = np.abs(solve_gearbox_modes(state).modes.frequency - hertz).max() / hertz.max()
     case = "stepped 24/57/27/108, three planets"
     return [
         at_most(case, SPRINGS, "mesh forces, largest relative difference", 1e-9, force),

@@ -111,16 +111,16 @@ def input_and_losses() -> tuple[Row, ...]:
     """Power that the teeth put in, and where it goes, of running planets and of a stage in a casing."""
     rows = list[Row]()
     system = twin(3, 13)
-    found = planets_in_a_casing()
-    box = running_stage(found, found.model.stages[0], synthetic_excitation(found, found.model.stages[0])).running
-    nominal = 2.0 * np.pi * found.model.flow.mesh_frequency["set"], abs(found.model.flow.speed["carrier"])
+    state = planets_in_a_casing()
+    box = running_stage(state, state.model.stages[0], synthetic_excitation(state, state.model.stages[0])).running
+    nominal = 2.0 * np.pi * state.model.flow.mesh_frequency["set"], abs(state.model.flow.speed["carrier"])
     lossy = replace(running(system), structure_loss=0.04, loss=np.full(4, 0.03))
     stages = {"planets on uneven supports": (lossy, 13 * TURN, TURN), "planetary stage in a casing": (box, *nominal)}
     for name, (stage, mesh, carrier) in stages.items():
         largest = 0.0
         for factor in (0.4, 1.0, 2.3):
-            known = {"harmonics": (2, 10), "side_bands": 6, "tolerance": 1e-13}
-            power = powers(stage, solve_running(stage, factor * mesh, factor * carrier, **known), 2)
+            options = {"harmonics": (2, 10), "side_bands": 6, "tolerance": 1e-13}
+            power = powers(stage, solve_running(stage, factor * mesh, factor * carrier, **options), 2)
             losses = power["springs"] + power["structure"]
             largest = max(largest, power["drive"] / losses, key=abs)
             apart = (power["excitation"] - losses - power["drive"]) / losses
@@ -146,21 +146,21 @@ def casing_forces() -> tuple[Row, ...]:
     pair, set_ = pair_in_a_casing(), planets_in_a_casing()
     stages = pair.model.stages[0], set_.model.stages[0]
     drives = stage_excitation(pair.contacts["stage"]), synthetic_excitation(set_, stages[1])
-    for found, stage, drive in zip((pair, set_), stages, drives, strict=True):
+    for state, stage, drive in zip((pair, set_), stages, drives, strict=True):
         name, what = f"{'planetary stage' if stage.planets else 'pair'} in a casing", "feet and bearings"
         what = "feet, bearings and ring" if stage.planets else what
         for factor in (0.4, 1.0, 2.3):
-            rows.append(at_most(name, "balance", text.format(what, factor), 1e-9, out_of_balance(found, drive, factor)))
+            rows.append(at_most(name, "balance", text.format(what, factor), 1e-9, out_of_balance(state, drive, factor)))
     return tuple(rows)
 
 
-def out_of_balance(found: Deflection, drive, factor: float) -> float:
+def out_of_balance(state: Deflection, drive, factor: float) -> float:
     """Largest force that is left on the casing, over the largest one on it, at a multiple of the speed."""
-    stage, outputs = found.model.stages[0], output_rows(found)
-    structured = running_stage(found, stage, drive)
+    stage, outputs = state.model.stages[0], output_rows(state)
+    structured = running_stage(state, stage, drive)
     single, motion = structured.running, structured.motion
-    mesh = 2.0 * np.pi * found.model.flow.mesh_frequency[stage.name] * factor
-    carrier = abs(found.model.flow.speed[stage.section.carrier]) * factor if stage.planets else 0.0
+    mesh = 2.0 * np.pi * state.model.flow.mesh_frequency[stage.name] * factor
+    carrier = abs(state.model.flow.speed[stage.section.carrier]) * factor if stage.planets else 0.0
     bands = 6 if stage.planets else 0
     response = solve_running(single, mesh, carrier, harmonics=(3, 8), side_bands=bands, tolerance=1e-13)
     grid = grid_of(response)
@@ -173,16 +173,16 @@ def out_of_balance(found: Deflection, drive, factor: float) -> float:
     on_casing = sum(feet.reshape(-1, 3, *inertia.shape[1:])) - sum(bearings.reshape(-1, 3, *inertia.shape[1:]))
     forces = grid.field(on_casing)
     if stage.planets:
-        forces = forces + ring_force(found, single, response, grid)
+        forces = forces + ring_force(state, single, response, grid)
     left = grid.field(inertia) - forces
     return float(np.abs(left).max() / np.abs(forces).max())
 
 
-def ring_force(found: Deflection, stage: RunningStage, response: RunningResponse, grid: Grid) -> np.ndarray:
+def ring_force(state: Deflection, stage: RunningStage, response: RunningResponse, grid: Grid) -> np.ndarray:
     """Force (3, periods, turns) of all ring meshes along x, y, z [N], every planet where the first one was before."""
-    box = found.model.stages[0]
+    box = state.model.stages[0]
     count, angles = len(box.planets), np.asarray(box.angles)
-    normal = found.model.assembly.contacts[box.meshes[count]].normals[1]
+    normal = state.model.assembly.contacts[box.meshes[count]].normals[1]
     lines, bands = response.force.shape[2:]
     total = np.zeros((3, grid.periods, grid.turns))
     for psi in angles - angles[0]:

@@ -50,12 +50,12 @@ def pair_on_bearings() -> tuple[Row, ...]:
     excitation = pair_excitation(case, solve_static(case), None)
     mean = excitation.stiffness.mean(axis=1)
     modes = undamped_modes(pair_model(case, planetary_set(case)).system, mean, damping_ratio=0.0)
-    found = solve_deflection(read_case(pair_of_rigid_gears_tables(case, float(mean[0]))))
-    stage = without_loss(running_stage(found, found.model.stages[0], excitation).running)
+    state = solve_deflection(read_case(pair_of_rigid_gears_tables(case, float(mean[0]))))
+    stage = without_loss(running_stage(state, state.model.stages[0], excitation).running)
     rows = list[Row]()
     for hertz in (300.0, 900.0, 2500.0):
-        known = {"excitation_harmonics": 6, "response_harmonics": 12, "method": "direct"}
-        wanted = solve_spectral(modes, excitation, hertz, **known).force[0, 0, 1:]
+        options = {"excitation_harmonics": 6, "response_harmonics": 12, "method": "direct"}
+        wanted = solve_spectral(modes, excitation, hertz, **options).force[0, 0, 1:]
         response = solve_running(stage, 2.0 * np.pi * hertz, 0.0, harmonics=(6, 12), side_bands=0, tolerance=1e-13)
         apart = np.abs(2.0 * response.force[0, 0, 1:, 0] - wanted).max() / np.abs(wanted).max()
         text = f"harmonics of the mesh force at {hertz:g} Hz, largest difference over the largest"
@@ -69,7 +69,7 @@ def without_loss(stage: RunningStage) -> RunningStage:
     return replace(stage, loss=0.0 * stage.loss, structure_loss=0.0, gyroscopic=0.0 * stage.gyroscopic, ring=ring)
 
 
-def synthetic_excitation(found: Deflection, stage: StageModel) -> MeshExcitation:
+def synthetic_excitation(state: Deflection, stage: StageModel) -> MeshExcitation:
     """Excitation of equal planets whose stiffness, deflection and force fluctuate, in phase with their places."""
     count = len(stage.angles)
     theta = 2.0 * np.pi * np.arange(POSITIONS) / POSITIONS
@@ -77,7 +77,7 @@ def synthetic_excitation(found: Deflection, stage: StageModel) -> MeshExcitation
     for number, mesh in enumerate(stage.meshes):
         with_ring = number // count
         at = theta + stage.sizes.teeth[-1] * stage.angles[number % count]
-        mean = found.model.assembly.contacts[mesh].stiffness.sum()
+        mean = state.model.assembly.contacts[mesh].stiffness.sum()
         signals[0, number] = mean * (1.0 + (0.15 + 0.05 * with_ring) * np.cos(at) + 0.05 * np.sin(2.0 * at))
         signals[1, number] = 1e-6 * (1.0 + with_ring) * np.cos(at + 0.4) + 2e-7 * np.cos(2.0 * at)
         signals[2, number] = 1000.0 * (1.0 + 0.1 * np.cos(at - 1.0))
@@ -94,31 +94,31 @@ def carrier_at_rest() -> tuple[Row, ...]:
     """A planetary stage whose carrier stands still, with k(t), and the modes of the gearbox with all its meshes."""
     rows = list[Row]()
     for name, casing in (("ring that stands still", False), ("casing on uneven feet", True)):
-        found = stage_in_casing(casing=casing)
-        stage = found.model.stages[0]
-        structured = running_stage(found, stage, synthetic_excitation(found, stage))
+        state = stage_in_casing(casing=casing)
+        stage = state.model.stages[0]
+        structured = running_stage(state, stage, synthetic_excitation(state, stage))
         running_one, motion = structured.running, structured.motion
         running_one = without_loss(running_one)
         for hertz in (150.0, 400.0, 1100.0):
-            apart = apart_from_gear_set(found, running_one, motion, hertz)
+            apart = apart_from_gear_set(state, running_one, motion, hertz)
             text = f"motions of sun, carrier and casing, mesh frequency {hertz:g} Hz, over the largest of all"
             rows.append(at_most(f"planetary stage at rest, {name}", GEAR_SETS, text, 1e-9, apart))
     return tuple(rows)
 
 
-def apart_from_gear_set(found: Deflection, stage: RunningStage, motion: np.ndarray, hertz: float) -> float:
+def apart_from_gear_set(state: Deflection, stage: RunningStage, motion: np.ndarray, hertz: float) -> float:
     """Largest difference of the harmonics of all motions but those of planets, over the largest of all."""
-    assembly, system, _ = linear_system(found)
+    assembly, system, _ = linear_system(state)
     drive = stage.excitation
     mean = drive.stiffness.mean(axis=1)
     modes = undamped_modes(replace(system, gyroscopic=None), mean, damping_ratio=0.0)
     # about the mean state
     about = {name: getattr(drive, name) for name in ("deflection", "force")}
     about = {name: signal - signal.mean(axis=1, keepdims=True) for name, signal in about.items()}
-    known = {"excitation_harmonics": 3, "response_harmonics": 8, "method": "direct"}
-    wanted = assembly.motions @ modes.shape @ solve_spectral(modes, replace(drive, **about), hertz, **known).modal[0]
+    options = {"excitation_harmonics": 3, "response_harmonics": 8, "method": "direct"}
+    wanted = assembly.motions @ modes.shape @ solve_spectral(modes, replace(drive, **about), hertz, **options).modal[0]
     response = solve_running(stage, 2.0 * np.pi * hertz, 0.0, harmonics=(3, 8), side_bands=6, tolerance=1e-13)
-    met = 2.0 * motion @ response.modal.sum(axis=1).T
-    planets = [6 * station + way for station in found.model.stages[0].planets for way in range(6)]
+    deflection = 2.0 * motion @ response.modal.sum(axis=1).T
+    planets = [6 * station + way for station in state.model.stages[0].planets for way in range(6)]
     others = np.setdiff1d(np.arange(assembly.count), planets)
-    return float(np.abs(met - wanted)[others, 1:].max() / np.abs(wanted[:, 1:]).max())
+    return float(np.abs(deflection - wanted)[others, 1:].max() / np.abs(wanted[:, 1:]).max())

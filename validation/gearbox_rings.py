@@ -37,18 +37,18 @@ MASS, INERTIA = 30.0, 0.6
 def on_foundation() -> tuple[Row, ...]:
     """The reference set at full band; the carrier at rest, for the set leaves out the terms of the turning frame."""
     reference = solve(with_values(read_case(SET), {"dynamics.up_to": f"{UP_TO!r} Hz"}), only="modes")["modes"]
-    found = solve_deflection(read_case(_tables()))
-    stage = found.model.stages[0]
-    ring = elastic_ring(found.model, stage)
-    running = without_loss(running_stage(found, stage, ring.excitation, [ring]).running)
+    state = solve_deflection(read_case(_tables()))
+    stage = state.model.stages[0]
+    ring = elastic_ring(state.model, stage)
+    running = without_loss(running_stage(state, stage, ring.excitation, [ring]).running)
     modes = undamped_modes(reference.model.system, reference.excitation.stiffness.mean(axis=1), damping_ratio=0.0)
     n_max, rows = reference.max_diameter, list[Row]()
     theta = np.array([0.5 * np.pi, 0.3])
     around = np.exp(1j * np.outer(np.arange(-n_max, n_max + 1), theta))
     for hertz in (320.0, 1500.0, 4100.0):
         excited = int(UP_TO / hertz)
-        known = {"excitation_harmonics": excited, "response_harmonics": excited + 12, "method": "direct"}
-        wanted = solve_spectral(modes, reference.excitation, np.array([hertz]), **known)
+        options = {"excitation_harmonics": excited, "response_harmonics": excited + 12, "method": "direct"}
+        wanted = solve_spectral(modes, reference.excitation, np.array([hertz]), **options)
         both = excited, excited + 12
         response = solve_running(running, 2.0 * np.pi * hertz, 0.0, harmonics=both, side_bands=0, tolerance=1e-13)
         forces = wanted.force[0][[0, len(stage.planets)], 1:]
@@ -56,9 +56,9 @@ def on_foundation() -> tuple[Row, ...]:
         text = f"mesh forces, excitation to 20 kHz, mesh frequency {hertz:g} Hz, over the largest"
         rows.append(at_most("reference set as a gearbox", "femgear, elastic", text, 1e-8, apart))
         field = mesh_and_ring_outputs(replace(reference, modes=modes), wanted)[1][0, 1:] @ around
-        heard = ring_lines(running, response, theta, np.tile([1.0, 0.0], (2, 1))).sum(axis=1)[1:]
+        lines = ring_lines(running, response, theta, np.tile([1.0, 0.0], (2, 1))).sum(axis=1)[1:]
         text = f"radial motion of the ring at two places, mesh frequency {hertz:g} Hz, over the largest"
-        apart = np.abs(heard - field).max() / np.abs(field).max()
+        apart = np.abs(lines - field).max() / np.abs(field).max()
         rows.append(at_most("reference set as a gearbox", "femgear, elastic", text, 1e-8, apart))
     return tuple(rows)
 
@@ -78,10 +78,10 @@ def in_casing() -> tuple[Row, ...]:
     for number, bearing in enumerate(tables["bearing"]):
         bearing["name"] = f"B{number}"
     tables["casing"]["stands_still"] = [bearing["name"] for bearing in tables["bearing"]]
-    found = solve_deflection(read_case(tables))
-    stage = found.model.stages[0]
-    ring = elastic_ring(found.model, stage)
-    _, system, stiffness = structure_without(found, stage, [ring])
+    state = solve_deflection(read_case(tables))
+    stage = state.model.stages[0]
+    ring = elastic_ring(state.model, stage)
+    _, system, stiffness = structure_without(state, stage, [ring])
     ours = undamped_modes(system, stiffness, damping_ratio=0.0).frequency
     wanted = _whole_frequencies(12)
     rows = [
@@ -124,11 +124,11 @@ def _whole_frequencies(count: int) -> np.ndarray:
     rigid[:, 2] = np.column_stack([-places[:, 1], places[:, 0]]).ravel()
     # what the foundation does to a rigid motion of the ring is all that its stiffness does
     pull = K @ rigid
-    foot, own = np.zeros((3, 3)), np.array([[1.0, 0.0, -CENTRE[1]], [0.0, 1.0, CENTRE[0]], [0.0, 0.0, 1.0]])
+    foot, moments = np.zeros((3, 3)), np.array([[1.0, 0.0, -CENTRE[1]], [0.0, 1.0, CENTRE[0]], [0.0, 0.0, 1.0]])
     for x, y, kx, ky in FEET:
         at = np.array([[1.0, 0.0, -y], [0.0, 1.0, x]])
         foot += at.T @ np.diag([kx, ky]) @ at
-    base_mass = own.T @ np.diag([MASS, MASS, INERTIA]) @ own - rigid.T @ (M @ rigid)
+    base_mass = moments.T @ np.diag([MASS, MASS, INERTIA]) @ moments - rigid.T @ (M @ rigid)
     whole_K = sparse.block_array([[K, -pull], [-pull.T, foot + rigid.T @ pull]], format="csc")
     whole_M = sparse.block_array([[M, None], [None, base_mass]], format="csc")
     values = eigsh(whole_K, k=count, M=whole_M, sigma=-1e5, return_eigenvectors=False)
@@ -146,8 +146,8 @@ def _assembled(grid: Grid, stiffness, sector_mass, sectors: int):
     every = np.concatenate(turned)
     # nodes of neighbouring sectors on the cut between them are one
     same = np.arange(len(every))
-    for one, other in cKDTree(every).query_pairs(1e-9):
-        same[max(one, other)] = min(one, other)
+    for node, other in cKDTree(every).query_pairs(1e-9):
+        same[max(node, other)] = min(node, other)
     first, number = np.unique(same, return_inverse=True)
     number = number.reshape(sectors, -1)
     size, parts = 2 * len(first), ([], [])

@@ -85,19 +85,19 @@ def body_motions(data: RigidSet, full: np.ndarray) -> dict[str, np.ndarray]:
     return motion
 
 
-def of_gearbox(found: Deflection) -> LoadedState:
+def of_gearbox(state: Deflection) -> LoadedState:
     """Motions, mesh forces and bearing forces of a gearbox whose shafts are single bodies, of its names."""
-    model = found.model
-    motion = dict(zip(model.assembly.names, found.motion.reshape(-1, 6), strict=True))
+    model = state.model
+    motion = dict(zip(model.assembly.names, state.motion.reshape(-1, 6), strict=True))
     held: dict[str, np.ndarray] = {}
-    for section, force in zip(model.case.bearing, found.bearing_force, strict=True):
+    for section, force in zip(model.case.bearing, state.bearing_force, strict=True):
         held[section.shaft] = held.get(section.shaft, 0.0) + force
-    return LoadedState(motion, found.mesh_force, held)
+    return LoadedState(motion, state.mesh_force, held)
 
 
-def set_state(data: RigidSet, found: Deflection, weight: bool) -> LoadedState:
+def set_state(data: RigidSet, state: Deflection, weight: bool) -> LoadedState:
     """The same of a set of rigid bodies by its own matrices, under the torques of the gearbox."""
-    flow = found.model.flow.port_torque
+    flow = state.model.flow.port_torque
     drive = PlanarTorque(flow["set sun"])
     system = gear_set_system(data, torque=drive)
     if weight:
@@ -149,8 +149,8 @@ def differences(ours: LoadedState, other: LoadedState) -> dict[str, float]:
     bodies = list(other.motion)
     a, b = (np.array([state.motion[name] for name in bodies]) for state in (ours, other))
 
-    def apart(one, two):
-        return float(np.abs(one - two).max(initial=0.0) / max(np.abs(two).max(initial=0.0), 1e-300))
+    def apart(computed, two):
+        return float(np.abs(computed - two).max(initial=0.0) / max(np.abs(two).max(initial=0.0), 1e-300))
 
     result = {
         "displacements of all bodies": apart(a[:, :3], b[:, :3]),
@@ -177,19 +177,19 @@ def compared(name: str, source: str, ours: LoadedState, other: LoadedState) -> l
     ]
 
 
-def stages_state(name: str, found: Deflection) -> LoadedState:
+def stages_state(name: str, state: Deflection) -> LoadedState:
     """The same of stages in series in the plane, by the train that had them before, at the same output torque.
 
     Of sets without teeth that train had the output torque by base radii, the gearbox has it by the nearest teeth.
     """
     former, motion, springs = stored()["statics"][name], {}, {}
-    force, last = np.array(former["mesh_force"]), found.model.stages[-1]
+    force, last = np.array(former["mesh_force"]), state.model.stages[-1]
     sun, _, ring = last.sizes.base_radii
     torque = -0.5 * force[list(last.meshes)].sum() * (sun + ring)
-    scale = found.model.flow.port_torque[last.section.carrier] / torque
+    scale = state.model.flow.port_torque[last.section.carrier] / torque
     for body, (x, y, turn) in former["motion"].items():
         motion[body] = scale * np.array([x, y, 0.0, 0.0, 0.0, turn])
-    for bearing in found.model.case.bearing:
+    for bearing in state.model.case.bearing:
         if 0.0 < bearing.stiffness[0] < math.inf:
             springs[bearing.shaft] = -np.array(bearing.stiffness) * motion[bearing.shaft]
     return LoadedState(motion, scale * force, springs)
@@ -215,8 +215,8 @@ def rigid_sets(weight: bool = True) -> tuple[tuple[str, str, LoadedState, Loaded
         ("spur set of Lin and Parker", "femgear, planar", planar, teeth),
     ):
         tables = standing(set_tables(data, numbers)) | ({"gravity": DOWN} if weight else {})
-        found = solve_deflection(read_case(tables))
-        states.append((name, source, of_gearbox(found), set_state(data, found, weight)))
+        state = solve_deflection(read_case(tables))
+        states.append((name, source, of_gearbox(state), set_state(data, state, weight)))
     return tuple(states)
 
 
@@ -225,11 +225,11 @@ def chains() -> tuple[tuple[str, str, LoadedState, LoadedState], ...]:
     states = []
     torque = {"operation.load_case[0].torque": {"stage 1 sun": "350 N m"}}
     for name in ("published_four_stages", "four_stage_reducer"):
-        found = solve_deflection(with_values(read_case(f"cases/{name}.toml"), torque))
-        states.append((name, "femgear, multistage", of_gearbox(found), stages_state(name, found)))
+        state = solve_deflection(with_values(read_case(f"cases/{name}.toml"), torque))
+        states.append((name, "femgear, multistage", of_gearbox(state), stages_state(name, state)))
     torques = {"operation.load_case[0].torque": {"rotor": "15 kN m"}, "gravity": DOWN}
-    found = solve_deflection(with_values(read_case("cases/wind_turbine_drivetrain.toml"), torques))
-    states.append(("36 coordinates", "femgear, drivetrain", of_gearbox(found), chain_state()))
+    state = solve_deflection(with_values(read_case("cases/wind_turbine_drivetrain.toml"), torques))
+    states.append(("36 coordinates", "femgear, drivetrain", of_gearbox(state), chain_state()))
     return tuple(states)
 
 
@@ -273,7 +273,7 @@ def pair_with_teeth() -> ToothState:
     stage = tables["pair"][0]
     del stage["gears"], stage["mesh"], tables["mass"]
     stage["teeth"] = tomllib.loads(case.source)
-    found = solve_deflection(read_case(tables))
+    state = solve_deflection(read_case(tables))
     static = solve(case, only="static")["static"]
     model = pair_model(case, static.planetary_set)
     system = model.system
@@ -290,7 +290,7 @@ def pair_with_teeth() -> ToothState:
         for name, part in zip(motion, np.split(supported + reaction, 2), strict=True)
     }
     other = LoadedState(motion, force, springs)
-    return ToothState(of_gearbox(found), other, _contact_apart(found.contacts["pair"].result.cycle, static.cycle))
+    return ToothState(of_gearbox(state), other, _contact_apart(state.contacts["pair"].result.cycle, static.cycle))
 
 
 def reference_set() -> ToothState:
@@ -298,7 +298,7 @@ def reference_set() -> ToothState:
     path = "cases/planetary_27_40_108.toml"
     case = read_case(path)
     tables = elastic_set_tables(path) | {"deflection": {"contact": True}}
-    found = solve_deflection(read_case(tables))
+    state = solve_deflection(read_case(tables))
     results = solve(case, only="modes")
     static, system = results["static"], gears_alone(results["modes"].model, None)
     held = np.array([float(name == "sun: rotation") for name in system.dofs])
@@ -313,7 +313,7 @@ def reference_set() -> ToothState:
         for name in ("sun", "carrier")
     }
     other = LoadedState(motion, force, springs)
-    return ToothState(of_gearbox(found), other, _contact_apart(found.contacts["set"].result.cycle, static.cycle))
+    return ToothState(of_gearbox(state), other, _contact_apart(state.contacts["set"].result.cycle, static.cycle))
 
 
 def loaded_states() -> tuple[Row, ...]:
@@ -335,14 +335,14 @@ def stages_side_by_side() -> tuple[Row, ...]:
     rows = []
     for second, gap in ((1e8, 0.0), (4e8, 0.03), (1e8, 0.03)):
         tables = split_pair_tables(f"{second} N/m", position=f"{0.03 + gap} m") | {"motions": "rotation"}
-        found = solve_deflection(read_case(tables))
+        state = solve_deflection(read_case(tables))
         # torque enters before the pairs and leaves behind them: each way has the shaft of the other's gap
         of_input, of_output = (gap * 32.0 / (math.pi * modulus * diameter**4) for diameter in (0.03, 0.04))
         first = 1.0 / (4e8 * radius**2) + ratio**2 * of_output
         other = 1.0 / (second * radius**2) + of_input
         case = f"two pairs, {1e-6 * second:g} and 400 N/um, {1e3 * gap:g} mm apart"
-        share = found.mesh_force[1] / found.mesh_force.sum()
+        share = state.mesh_force[1] / state.mesh_force.sum()
         rows.append(within(case, "closed form", "share of the second pair", first / (first + other), share, 1e-6))
-        balance = found.mesh_force.sum() * radius / 100.0 - 1.0
+        balance = state.mesh_force.sum() * radius / 100.0 - 1.0
         rows.append(at_most(case, "equilibrium", "torques of both less the input, relative", LARGEST, balance))
     return tuple(rows)

@@ -35,11 +35,11 @@ def _pair(teeth, shifts, degrees, *, internal=False, module=1.0, truncated=False
     alpha = math.radians(degrees)
     cosine = math.cos(alpha)
     rack = BasicRack(root_radius=0.1)
-    one, two = (Gear(z, 1e-3 * module, alpha, x, 0.02, 1e-3, rack=rack) for z, x in zip(teeth, shifts))
+    first, two = (Gear(z, 1e-3 * module, alpha, x, 0.02, 1e-3, rack=rack) for z, x in zip(teeth, shifts))
     if internal:
         two = replace(two, internal=True, rim_radius=1.0)
-    distance = 1e3 * zero_backlash_distance(one, two)
-    working = working_pressure_angle(one, two, 1e-3 * distance)
+    distance = 1e3 * zero_backlash_distance(first, two)
+    working = working_pressure_angle(first, two, 1e-3 * distance)
     reference = 0.5 * module * (teeth[1] - teeth[0] if internal else sum(teeth))
     cut = sum(shifts) - (distance - reference) / module if truncated else 0.0
     base_1, base_2 = (0.5 * module * z * cosine for z in teeth)

@@ -45,13 +45,13 @@ def by_phasing(data: HelicalSet, *, below: float = 15e3) -> dict[str, np.ndarray
 def table_4() -> tuple[Row, ...]:
     """All modes below 15 kHz, with their phasing from the shapes."""
     rows, data = [], kahraman_set()
-    modes, found = gear_set_modes(data), by_phasing(data)
+    modes, frequencies = gear_set_modes(data), by_phasing(data)
     moved, others = _entries_of_pairs(data), independent.kahraman().frequencies()
     for key, (printed, precise) in TABLE_4.items():
         twins = 2 if key == "SP" else 1
-        rows.append(counted("K", KAHRAMAN, f"{key} modes below 15 kHz", twins * len(printed), len(found[key])))
+        rows.append(counted("K", KAHRAMAN, f"{key} modes below 15 kHz", twins * len(printed), len(frequencies[key])))
         for k, (text, value) in enumerate(zip(printed, precise, strict=True)):
-            ours = found[key][::twins][k]
+            ours = frequencies[key][::twins][k]
             rows.append(_printed_mode(key, text, value, ours, moved[k]))
             reference = others[np.argmin(np.abs(others - ours))]
             rows.append(within("K", INDEPENDENT, f"{key} mode [Hz]", reference, ours, 1e-9))
@@ -191,8 +191,8 @@ def leakage() -> tuple[Row, ...]:
         worst, kinds = 0.0, []
         for h in range(1, 5):
             kinds.append(("IP", "SP", "CP", "SP")[h * case.sun_teeth % 4])
-            own = names == PHASINGS[kinds[-1]]
-            worst = max(worst, work[~own, h - 1].max() / work[own, h - 1].max())
+            matching = names == PHASINGS[kinds[-1]]
+            worst = max(worst, work[~matching, h - 1].max() / work[matching, h - 1].max())
         teeth = "-".join(map(str, TABLE_2[letter][:3]))
         name = f"case {letter}, {teeth}: harmonics 1 to 4 excite {', '.join(kinds)} modes; others"
         rows.append(at_most("K", f"{PAPER}, Table 2", name, 1e-9, worst))
@@ -206,13 +206,13 @@ def response() -> tuple[Row, ...]:
     hertz = np.linspace(50.0, 15e3, 300)
     for letter, convention in product("EF", ("rotation", "printed")):
         error = 1e-6 * phase_factors(cases(convention=convention)[letter], range(1, 5)).T
-        found = modal_error_response(modes, hertz, error)
+        response = modal_error_response(modes, hertz, error)
         k = data.column_stiffness
         direct = mesh_error_response(system, hertz, error, mesh_stiffness=k, damping_ratio=0.05)
-        away = np.abs(found.force[0] - direct.force).max() / np.abs(direct.force).max()
+        away = np.abs(response.force[0] - direct.force).max() / np.abs(direct.force).max()
         name = f"case {letter}, {convention} phases: "
         rows.append(at_most("K", "direct solution", name + "mesh forces, difference", 1e-10, away))
-        rows += _symmetry(name, convention, np.abs(found.force[0, :, 0, :4]))
+        rows += _symmetry(name, convention, np.abs(response.force[0, :, 0, :4]))
     fine = np.arange(5000.0, 15000.0, 5.0)
     # a mode and any constant beside it peak within the damping ratio of the mode: it is the gate
     light = 0.005
@@ -227,7 +227,7 @@ def response() -> tuple[Row, ...]:
         ("F", 1, "SP", None),
         ("F", 3, "SP", None),
     ):
-        peak, wide = (_peak(one, letter, h, fine) for one in (sharp, modes))
+        peak, wide = (_peak(peaks_of, letter, h, fine) for peaks_of in (sharp, modes))
         choices = np.array(TABLE_4[kind][0])
         mode = mode or choices[np.abs(choices - peak).argmin()]
         name = f"case {letter}, harmonic {h}: highest peak from 5 to 15 kHz, {kind} mode [Hz]"
@@ -239,8 +239,8 @@ def response() -> tuple[Row, ...]:
 def _peak(modes, letter: str, harmonic: int, hertz) -> float:
     """Frequency [Hz] of the harmonic at which the force of the first sun mesh is largest."""
     error = 1e-6 * phase_factors(cases()[letter], [harmonic]).T
-    found = modal_error_response(modes, hertz / harmonic, error, harmonics=[harmonic])
-    return float(hertz[np.abs(found.force[0, :, 0, 0]).argmax()])
+    response = modal_error_response(modes, hertz / harmonic, error, harmonics=[harmonic])
+    return float(hertz[np.abs(response.force[0, :, 0, 0]).argmax()])
 
 
 def _symmetry(name: str, convention: str, size: np.ndarray) -> tuple[Row, ...]:

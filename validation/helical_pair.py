@@ -93,32 +93,32 @@ def solid_gear(sector, angle: float, width: float, *, mirrors: bool = False) -> 
     """Compute a gear with a base helix angle [rad] and a width [m]; its ends are free, or mirror planes."""
     gear, slope = sector.gear, math.tan(angle)
     stations, depths, loads, seen = observed_flanks(sector.grid, gear)
-    loads, seen = (flank_columns(one, stations.normals, slope) for one in (loads, seen))
+    loads, seen = (flank_columns(columns, stations.normals, slope) for columns in (loads, seen))
     section = section_matrices(sector.grid, STEEL, slope / gear.base_radius)
     axial = axial_matrices(width, *HEIGHTS)
-    found = solid_compliance(sector.grid, section, axial, gear.teeth, loads, seen, mirrors=mirrors)
-    return SolidGear(stations.roll, gear.base_radius, depths[:, 0], found, angle, width)
+    compliance = solid_compliance(sector.grid, section, axial, gear.teeth, loads, seen, mirrors=mirrors)
+    return SolidGear(stations.roll, gear.base_radius, depths[:, 0], compliance, angle, width)
 
 
 def contact_lines(degrees: int, position: float) -> dict[int, ContactLine]:
     """Lines of all tooth pairs that touch at a position [mesh periods], by the number of the pair."""
-    pair, slope, found = helical_pair(degrees)[0], math.tan(BASE[degrees]), {}
+    pair, slope, compliances = helical_pair(degrees)[0], math.tan(BASE[degrees]), {}
     reach = 0.5 * slope * WIDE[degrees]
     for number in range(-4, 5):
         middle = pair.base_pitch * (position + number)
         path = max(pair.path[0], middle - reach), min(pair.path[1], middle + reach)
         if path[1] > path[0]:
             knots = max(3, round(KNOTS * (path[1] - path[0]) / (2.0 * reach)))
-            found[number] = ContactLine(path, slope, middle, knots)
-    return found
+            compliances[number] = ContactLine(path, slope, middle, knots)
+    return compliances
 
 
 def body_part(starts, gears, lines: dict[int, ContactLine]) -> np.ndarray:
     """What both bodies yield between all functions of all lines [m/N], by roll lengths at the pitch point."""
     bodies = dict.fromkeys(product(lines, lines), 0.0)
     for gear, start, way in zip(gears, starts, (1, -1), strict=True):
-        places = {n: (start + way * one.path, way * one.height) for n, one in lines.items()}
-        loads = {n: gear.loads(one, *places[n]) for n, one in lines.items()}
+        places = {n: (start + way * line.path, way * line.height) for n, line in lines.items()}
+        loads = {n: gear.loads(line, *places[n]) for n, line in lines.items()}
         for i, j in bodies:
             part = loads[i].T @ gear.compliance[way * (i - j)] @ loads[j]
             bodies[i, j] = bodies[i, j] + part - (gear.at_depth(lines[i], *places[i]) if i == j else 0.0)
@@ -132,17 +132,17 @@ def solid_pair(gears, degrees: int, position: float) -> tuple[float, float]:
     (flanks,) = mesh_pairs(helical_pair(degrees)[0])
     starts, load = (flanks.pitch_roll_1, flanks.pitch_roll_2), LINE_LOAD * width
     H, lines = body_part(starts, gears, numbered), list(numbered.values())
-    whole = np.concatenate([one.loads.sum(axis=0) for one in lines])
-    every = np.split(np.arange(len(whole)), np.cumsum([one.loads.shape[1] for one in lines])[:-1])
+    whole = np.concatenate([contact_line.loads.sum(axis=0) for contact_line in lines])
+    every = np.split(np.arange(len(whole)), np.cumsum([contact_line.loads.shape[1] for contact_line in lines])[:-1])
     modulus = STEEL.youngs_modulus / (2 * (1 - STEEL.poisson_ratio**2))
 
     def yields(forces, factor):
         """Bodies and half spaces under the forces, of cores a factor times half of Hertz's half width."""
         total = H.copy()
         for at, line in zip(every, lines, strict=True):
-            one, two = starts[0] + line.path, starts[1] - line.path
+            roll, two = starts[0] + line.path, starts[1] - line.path
             carried = whole[at] @ forces[at] / line.weight.sum()
-            half = [hertz_half_width(carried, radius, modulus) for radius in one * two / (one + two)]
+            half = [hertz_half_width(carried, radius, modulus) for radius in roll * two / (roll + two)]
             core = 0.5 * factor * np.array(half) / math.sqrt(along)
             total[np.ix_(at, at)] += surface(line, core, STEEL, along)
         return total
@@ -150,9 +150,9 @@ def solid_pair(gears, degrees: int, position: float) -> tuple[float, float]:
     forces, before = np.full(len(whole), load / whole.sum()), 0.0
     for _ in range(STEPS):
         # Hertz's pressure moves the middle by ln(2 / a) + 1/2, which changes with the load by ln(2 / a)
-        found = np.linalg.solve(yields(forces, math.exp(-0.5)), whole)
-        approach = load / (whole @ found)
-        forces = approach * found
+        motions = np.linalg.solve(yields(forces, math.exp(-0.5)), whole)
+        approach = load / (whole @ motions)
+        forces = approach * motions
         if abs(approach - before) < SETTLED * approach:
             assert forces.min() > 0.0, "flanks pull"
             return float(approach), float(whole @ np.linalg.solve(yields(forces, 1.0), whole)) / width
@@ -163,7 +163,7 @@ def solid_pair(gears, degrees: int, position: float) -> tuple[float, float]:
 def solid_means(degrees: int, *, straight: bool = False, mirrors: bool = False) -> np.ndarray:
     """Mean approach [m] and stiffness over width [N/m^2] of solid gears, of straight or helical teeth."""
     angle, sectors = 0.0 if straight else BASE[degrees], helical_pair(degrees)[1].gears
-    gears = [solid_gear(one, angle, WIDE[degrees], mirrors=mirrors) for one in sectors]
+    gears = [solid_gear(sector, angle, WIDE[degrees], mirrors=mirrors) for sector in sectors]
     return np.mean([solid_pair(gears, degrees, at) for at in POSITIONS], axis=0)
 
 

@@ -80,7 +80,7 @@ class ContactLine:
         places = np.linspace(*path, knots)
         self.height = (self.path - middle) / slope
         self.path_ends, self.ends = path, (np.array(path) - middle) / slope
-        self.basis = np.array([np.interp(self.path, places, one) for one in np.eye(knots)]).T
+        self.basis = np.array([np.interp(self.path, places, hat) for hat in np.eye(knots)]).T
         self.loads = self.weight[:, None] * self.basis
 
 
@@ -97,19 +97,19 @@ def endless_flank(sector, material, line: ContactLine, roll, angle: float, *, tw
     gear, slope = sector.gear, math.tan(angle)
     twist, along = slope / gear.base_radius, math.cos(angle) if twisted else 1.0
     stations, depths, loads, seen = observed_flanks(sector.grid, gear)
-    loads, seen = (flank_columns(one, stations.normals, twisted * slope) for one in (loads, seen))
+    loads, seen = (flank_columns(columns, stations.normals, twisted * slope) for columns in (loads, seen))
     every = math.ceil(PITCHES / (gear.pitch_angle * gear.reference_radius * twist))
     last = math.ceil(DEPTHS / (depths.min() * math.cos(angle) * twist))
-    some = np.unique(np.append(np.arange(every + 1), np.geomspace(every, last, WAVES).round().astype(int)))
-    waves = [(q * twist, 2 * np.pi * q / gear.teeth) for q in some]
-    known = np.array(list(wave_compliances(sector.grid, material, twisted * twist, loads, seen, waves)))
-    short = CubicSpline(np.log(some[every - 3 :]), known[every - 3 :])
+    chosen = np.unique(np.append(np.arange(every + 1), np.geomspace(every, last, WAVES).round().astype(int)))
+    waves = [(q * twist, 2 * np.pi * q / gear.teeth) for q in chosen]
+    computed = np.array(list(wave_compliances(sector.grid, material, twisted * twist, loads, seen, waves)))
+    short = CubicSpline(np.log(chosen[every - 3 :]), computed[every - 3 :])
     z = (-1.0 if gear.internal else 1.0) * (roll - roll.mean()) / slope
     at = at_stations(roll, stations.roll)
     total = np.zeros((KNOTS, KNOTS))
     for q in range(last + 1):
         F = at.T @ (np.exp(-1j * q * twist * z)[:, None] * line.loads)
-        part = (F.conj().T @ (known[q] if q <= every else short(math.log(q))) @ F).real
+        part = (F.conj().T @ (computed[q] if q <= every else short(math.log(q))) @ F).real
         total += part * (1.0 if q == 0 else 2.0) * twist / (2 * np.pi)
     # straight flanks carry the line across, in their own arcs; helical ones along themselves
     across = 0.0 if twisted else roll**2 / (2 * gear.base_radius)
@@ -128,8 +128,8 @@ def surface(line: ContactLine, core: np.ndarray, material, along: float) -> np.n
     y, weight = line.height / along, line.weight / along
     apart = np.abs(np.subtract.outer(y, y)) + np.eye(len(y))
     others = weight / apart * (1 - np.eye(len(y)))
-    own = np.arcsinh((line.ends[1] / along - y) / core) + np.arcsinh((y - line.ends[0] / along) / core)
-    kernel = others + np.diag(own - others.sum(axis=1))
+    own_part = np.arcsinh((line.ends[1] / along - y) / core) + np.arcsinh((y - line.ends[0] / along) / core)
+    kernel = others + np.diag(own_part - others.sum(axis=1))
     factor = 2 * (1 - material.poisson_ratio**2) / (np.pi * material.youngs_modulus)
     yields = factor / along * line.loads.T @ kernel @ line.basis
     return 0.5 * (yields + yields.T)
@@ -147,13 +147,13 @@ def spur_stiffness(sectors, material, line: ContactLine, rolls, pitch: float, he
         arc = stations.roll**2 / (2 * gear.base_radius)
         elastic = np.subtract.outer(arc, arc), material.shear_modulus, material.poisson_ratio
         once, twice = (depth_displacement(elastic[0], f * depths, *elastic[1:]) for f in (1, 2))
-        found = regular_compliance(tooth_compliance(whole.supported()), 2 * once - twice)
-        flanks.append((stations.roll, found[:, : len(arc), : len(arc)]))
+        compliance = regular_compliance(tooth_compliance(whole.supported()), 2 * once - twice)
+        flanks.append((stations.roll, compliance[:, : len(arc), : len(arc)]))
 
     def between(seen, loaded, teeth):
         total = 0.0
         for (stations, regular), roll, way in zip(flanks, rolls, (-1, 1), strict=True):
-            (i, a), (j, b) = (station_weights(roll(one), stations) for one in (seen, loaded))
+            (i, a), (j, b) = (station_weights(roll(points), stations) for points in (seen, loaded))
             total = total + np.einsum("na,nab,nb->n", a, regular[way * teeth][i[:, :, None], j[:, None]], b)
         return total
 
@@ -167,13 +167,13 @@ def spur_stiffness(sectors, material, line: ContactLine, rolls, pitch: float, he
     x, w = np.polynomial.legendre.leggauss(8)
     parts = [(low, high - low) for low, high in ((start, change), (change, start + pitch))]
     places = [
-        (low + 0.5 * size * (1 + one), 0.5 * size * part / pitch)
+        (low + 0.5 * size * (1 + node), 0.5 * size * part / pitch)
         for low, size in parts
-        for one, part in zip(x, w, strict=True)
+        for node, part in zip(x, w, strict=True)
     ]
     for first, part in places:
         at = np.arange(first, end, pitch)
-        i, j = (one.ravel() for one in np.indices((len(at),) * 2))
+        i, j = (index.ravel() for index in np.indices((len(at),) * 2))
         H = [between(at[[m]], at[[n]], n - m)[0] for m, n in zip(i, j, strict=True)]
         H = np.reshape(H, (len(at),) * 2) + np.diag(np.interp(at, line.path, hertz))
         alone.append(part * np.linalg.solve(H, np.ones(len(at))).sum())
@@ -196,21 +196,21 @@ def tooth_stiffness(helix: float, mesh: int, flank_elements: int = 8) -> dict[st
     pitch = two[0].gear.base_radius * two[0].gear.pitch_angle
     line = ContactLine(pair.path, math.tan(angle))
     rolls = (lambda at: pair.pitch_roll_1 + at, lambda at: pair.pitch_roll_2 - pair.sign * at)
-    one, two_rolls = (roll(line.path) for roll in rolls)
-    radius = one * two_rolls / (two_rolls + pair.sign * one)
+    roll_of_first, two_rolls = (roll(line.path) for roll in rolls)
+    radius = roll_of_first * two_rolls / (two_rolls + pair.sign * roll_of_first)
     load = _line_load(case, gears) * pitch / (pair.path[1] - pair.path[0])
     modulus = material.youngs_modulus / (2 * (1 - material.poisson_ratio**2))
-    core = np.array([0.5 * hertz_half_width(load, one, modulus) for one in radius])
+    core = np.array([0.5 * hertz_half_width(load, curvature, modulus) for curvature in radius])
     hertz = -4 * (1 - material.poisson_ratio**2) / (np.pi * material.youngs_modulus) * np.log(core)
-    found = {"spur": spur_stiffness(two, material, line, rolls, pitch, hertz)}
+    stiffness = {"spur": spur_stiffness(two, material, line, rolls, pitch, hertz)}
     for name, along in (("straight", 1.0), ("helical", math.cos(angle))):
         H = surface(line, core / math.sqrt(along), material, along) + sum(
             endless_flank(sector, material, line, roll(line.path), angle, twisted=name == "helical")
             for sector, roll in zip(two, rolls, strict=True)
         )
         whole, length = line.loads.sum(axis=0), line.weight.sum()
-        found[name] = [length / H.sum(), float(whole @ np.linalg.solve(H, whole)) / length]
-    return found
+        stiffness[name] = [length / H.sum(), float(whole @ np.linalg.solve(H, whole)) / length]
+    return stiffness
 
 
 def _case(helix: float):
@@ -226,8 +226,8 @@ def factors() -> tuple[Row, ...]:
         angle = base_helix_angle(case.sun.pressure_angle, case.helical.helix_angle)
         virtual = section_stiffness(case, planetary_set(case)).factor
         for mesh, (kind, power) in enumerate((("sun-planet", 2.2), ("planet-ring", 2.3))):
-            found = tooth_stiffness(helix, mesh)
-            loaded, shared = np.array(found["helical"]) / found["straight"]
+            stiffness = tooth_stiffness(helix, mesh)
+            loaded, shared = np.array(stiffness["helical"]) / stiffness["straight"]
             source, name = "helical teeth in three dimensions", f"{helix:g} degrees, {kind}: "
             formula = name + f"cos(beta_b)^{power} on straight teeth under oblique lines"
             rows += [
@@ -245,7 +245,7 @@ def factors() -> tuple[Row, ...]:
                     "helix",
                     source,
                     name + "factor of virtual gears on slices of the transverse section",
-                    found["helical"][1] / found["spur"][1],
+                    stiffness["helical"][1] / stiffness["spur"][1],
                     virtual[mesh],
                     0.05,
                     explanation=EXPLAINED,
@@ -264,14 +264,14 @@ def helical_root_stress(sector, material, station: int, angle: float) -> float:
     twist, stations = slope / gear.base_radius, flank_stations(grid, gear)
     loads = flank_columns(flank_load_columns(grid, stations), stations.normals, slope)[:, [station]]
     names = [name for name in ("fillet_left", "root_left") if name in grid.boundaries]
-    edges = np.vstack([boundary_edges(grid, one) for one in names[:: -1 if gear.internal else 1]])
+    edges = np.vstack([boundary_edges(grid, curve) for curve in names[:: -1 if gear.internal else 1]])
     nodes = np.append(edges[:, [0, 2]].ravel(), edges[-1, 1])
     seen = np.zeros((3 * grid.n_nodes, 3 * len(nodes)))
     seen[(3 * nodes[:, None] + np.arange(3)).ravel(), np.arange(3 * len(nodes))] = 1.0
     waves = [(0.0, 2 * np.pi * n / gear.teeth) for n in range(gear.teeth // 2 + 1)]
     share = np.array([1 if n == 0 or 2 * n == gear.teeth else 2 for n in range(len(waves))]) / gear.teeth
-    found = list(wave_compliances(grid, material, twist, loads, seen, waves))
-    v, x = np.tensordot(share, found, 1)[:, 0].real.reshape(-1, 3), np.asarray(grid.points)[nodes]
+    compliances = list(wave_compliances(grid, material, twist, loads, seen, waves))
+    v, x = np.tensordot(share, compliances, 1)[:, 0].real.reshape(-1, 3), np.asarray(grid.points)[nodes]
     arc = np.append(0.0, np.cumsum(np.hypot(*np.diff(x, axis=0).T)))
     along = CubicSpline(arc, np.insert(x, 2, 0.0, axis=1))(arc, 1)
     size = np.linalg.norm(along, axis=1)[:, None]
@@ -310,8 +310,8 @@ def root_stresses() -> tuple[Row, ...]:
 def refined() -> tuple[Row, ...]:
     """The factor at 20 degrees with twice the elements."""
     ratios = [
-        np.divide(found["helical"], found[other])[1]
-        for found in (tooth_stiffness(20.0, 0, 16), tooth_stiffness(20.0, 0))
+        np.divide(stiffness["helical"], stiffness[other])[1]
+        for stiffness in (tooth_stiffness(20.0, 0, 16), tooth_stiffness(20.0, 0))
         for other in ("straight", "spur")
     ]
     name, source = "20 degrees, sun-planet: helical over ", "twice the elements"

@@ -44,7 +44,7 @@ def _every_line() -> dict[str, SensorLines]:
     dynamics, housing = reference_dynamics(), reference_housing()
     modes = replace(reference_modes(), symmetry=1)
     field = mesh_and_ring_outputs(modes, dynamics.response)[1]
-    place = dynamics.ring_teeth, np.array([one.carrier for one in dynamics.speeds]), 0.0
+    place = dynamics.ring_teeth, np.array([state.carrier for state in dynamics.speeds]), 0.0
     exact = fixed_sensor_lines(field, *place)
     linear = lines_in_form(component_lines(field, *place), "linear", housing.points, housing.harmonics)
     return {"exact lines": exact, "linear interpolation": linear}
@@ -78,8 +78,8 @@ def first_harmonic() -> tuple[Row, ...]:
     force = dynamics.response.force[SLOW, 3:, :2]
     field = hanning_model(force, reference_modes().model.planet_angles)
     carrier = dynamics.speeds[SLOW].carrier
-    heard = fixed_sensor_lines(field, dynamics.ring_teeth, carrier, 0.0)
-    band = analyse_band(OrderSpectrum(heard.order, heard.displacement), dynamics.ring_teeth, 1)
+    sensor_lines = fixed_sensor_lines(field, dynamics.ring_teeth, carrier, 0.0)
+    band = analyse_band(OrderSpectrum(sensor_lines.order, sensor_lines.displacement), dynamics.ring_teeth, 1)
     label = "250 rpm, 1st mesh harmonic, Hanning window on the planet-ring forces: "
     rows.append(counted("paper", PAPER, label + "lobes", 3, len(band.lobes.position)))
     return tuple(rows)
@@ -119,11 +119,11 @@ def interpolation() -> tuple[Row, ...]:
     field[0] = 0.0
     samples = 20 * z_ring * points
     literal = heaviside_linear(point_signals(field, z_ring, points=points, samples=samples), passages(points, 0.0))
-    heard = np.fft.rfft(literal)[1 : z_ring * len(field)] * 2 / samples
+    amplitudes = np.fft.rfft(literal)[1 : z_ring * len(field)] * 2 / samples
     ours = heaviside_linear_lines(field, z_ring, dynamics.speeds[FAST].carrier, 0.0, points=points)
     closed = ours.displacement[1 : z_ring * len(field)]
     quantity = "3100 rpm: lines of Eqs. 13-16 written out in time against the closed form, over the largest"
-    error = np.abs(heard - closed).max() / np.abs(closed).max()
+    error = np.abs(amplitudes - closed).max() / np.abs(closed).max()
     rows.append(at_most("sinc", "Eqs. 13-16 as meant", quantity, 1e-5, error, note=_sampled(samples)))
     rows.append(_static_images(housing, dynamics, points))
     return tuple(rows)

@@ -107,13 +107,13 @@ def one_term_balance() -> tuple[Row, ...]:
             return force - load, size - error * ratio**2
 
         mean, amplitude = fsolve(equations, guess, xtol=1e-12)
-        found = solve_harmonic_balance(
+        deflection = solve_harmonic_balance(
             pair.problem(ratio), 1.0, harmonics=1, samples=32768, start=[[mean, amplitude]], stability=False
         ).deflection[0]
         name = f"one harmonic, zeta 0.09, ratio {ratio}:"
         rows += [
-            within("impacts", KAHRAMAN, f"{name} mean", mean, found[0].real, 1e-6),
-            within("impacts", KAHRAMAN, f"{name} amplitude", amplitude, abs(found[1]), 1e-6),
+            within("impacts", KAHRAMAN, f"{name} mean", mean, deflection[0].real, 1e-6),
+            within("impacts", KAHRAMAN, f"{name} amplitude", amplitude, abs(deflection[1]), 1e-6),
         ]
     for ratio in separation_ratios(damping_ratio=0.15, load=load, error=error):
         pair = ImpactPair(damping_ratio=0.15, load=load, tooth_error=(error,))
@@ -155,8 +155,8 @@ def damping_and_impacts() -> tuple[Row, ...]:
         ours = borders[np.argmin(np.abs(borders - near))]
         ratios = np.concatenate([before, ours + np.linspace(-0.008, 0.008, 5)])
         run = sweep_response(lambda r, pair=pair: (pair.problem(r), 1.0), ratios, steps=400, most=400, tolerance=1e-7)
-        found = level_crossings(ratios[-5:], run.lowest[-5:, 0], level)[0]
-        rows.append(within("impacts", INTEGRATION, f"zeta {zeta}: {name}, ratio", found, ours, 2e-3))
+        border = level_crossings(ratios[-5:], run.lowest[-5:, 0], level)[0]
+        rows.append(within("impacts", INTEGRATION, f"zeta {zeta}: {name}, ratio", border, ours, 2e-3))
     low, high = np.sort(branches[0.09].parameter[branches[0.09].folds])
     pair = example_pair(0.09)
     for name, ratios, states in (
@@ -164,10 +164,10 @@ def damping_and_impacts() -> tuple[Row, ...]:
         ("down", [low + 0.1, low + 0.03, low + 0.002, low - 0.002], [2, 2, 2, 0]),
     ):
         run = sweep_response(lambda r, pair=pair: (pair.problem(r), 1.0), ratios, steps=400, most=500)
-        found = range_states(run.lowest[:, 0], run.highest[:, 0])
+        border = range_states(run.lowest[:, 0], run.highest[:, 0])
         fold = high if name == "up" else low
         text = f"zeta 0.09: sweep {name} jumps within 0.002 of the limit point {fold:.4f}"
-        rows.append(counted("impacts", INTEGRATION, text, 1, int(found.tolist() == states)))
+        rows.append(counted("impacts", INTEGRATION, text, 1, int(border.tolist() == states)))
     return tuple(rows)
 
 
@@ -175,7 +175,7 @@ def over_two_periods(problem: NonlinearSystem) -> NonlinearSystem:
     """The same problem with half its base frequency."""
     (mesh,) = problem.elements
     mesh = replace(mesh, stiffness=FourierSeries(mesh.stiffness.amplitudes, (2,)))
-    forces = tuple(HarmonicForce(one.force, (2 * one.orders[0],)) for one in problem.forces)
+    forces = tuple(HarmonicForce(force.force, (2 * force.orders[0],)) for force in problem.forces)
     return replace(problem, elements=(mesh,), forces=forces)
 
 
@@ -190,16 +190,16 @@ def period_two() -> tuple[Row, ...]:
 
     def lowest(ratio):
         problem = over_two_periods(pair.problem(ratio))
-        found = solve_harmonic_balance(problem, 0.5, harmonics=32, samples=2048, start=start, stability=False)
-        return float(found.at(phase).min())
+        subharmonic = solve_harmonic_balance(problem, 0.5, harmonics=32, samples=2048, start=start, stability=False)
+        return float(subharmonic.at(phase).min())
 
     ours = brentq(lambda ratio: lowest(ratio) - BACK, 1.63, 1.66, xtol=1e-6)
     ratios = np.concatenate([before, ours + np.linspace(0.008, -0.008, 5)])
     run = sweep_response(lambda r: (pair.problem(r), 1.0), ratios, **steps)
-    found = level_crossings(ratios[2:], run.lowest[2:, 0], BACK)[0]
+    border = level_crossings(ratios[2:], run.lowest[2:, 0], BACK)[0]
     name = "zeta 0.09, two tooth periods:"
     text = f"{name} two-sided impacts begin from above, ratio"
-    rows = [within("impacts", INTEGRATION, text, found, ours, 2e-3)]
+    rows = [within("impacts", INTEGRATION, text, border, ours, 2e-3)]
     for ratio in (1.6, 1.55):
         run = sweep_response(lambda r: (pair.problem(r), 1.0), [*before, 1.65, ratio], **steps)
         start = run.lines[-1]
@@ -239,7 +239,7 @@ def runge_kutta_exponent(force, slope, damping, push, members: int, periods: int
 def chaos() -> tuple[Row, ...]:
     """Ueda's attractor and the lightly loaded pair: exponents, sections, another integration."""
     ueda = oscillator(PolynomialSprings([0], [[0.0, 0.0, 1.0]]), damping=0.05, forces=[(7.5, (1,))])
-    found = lyapunov_exponents(ueda, 1.0, count=2, points=1000, skip=50)
+    exponents = lyapunov_exponents(ueda, 1.0, count=2, points=1000, skip=50)
     zeta, load, error, ratio = 0.05, 0.1, 0.2, 1.5
     pair = lightly_loaded_pair(zeta)
     ours = lyapunov_exponents(pair.problem(ratio), 1.0, count=2, points=600, skip=60)
@@ -262,8 +262,8 @@ def chaos() -> tuple[Row, ...]:
             "one long run elsewhere",
             "Ueda's attractor (1979): largest exponent [1/s]",
             0.0999,
-            found.largest,
-            3.0 * found.scatter[0],
+            exponents.largest,
+            3.0 * exponents.scatter[0],
             relative=False,
             note="gate: three errors of the mean",
         ),
@@ -272,7 +272,7 @@ def chaos() -> tuple[Row, ...]:
             "-c",
             "Ueda's attractor: sum of both exponents [1/s]",
             -0.05,
-            found.exponents.sum(),
+            exponents.exponents.sum(),
             1e-3,
             relative=False,
         ),

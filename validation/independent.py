@@ -44,30 +44,30 @@ class Network:
         self.places[name] = np.array([*place, 0.0])
         self.mass[name] = np.array([mass, mass, mass, diametral, diametral, polar])
 
-    def point_spring(self, kind: str, one: str, other: str, point, normal, stiffness: float, *, second=None):
+    def point_spring(self, kind: str, body: str, other: str, point, normal, stiffness: float, *, second=None):
         """Spring between a point of each body [m] (the same one unless `second` is given) along a normal."""
         row = np.zeros((len(self.places), 6))
-        for sign, name, at in ((1.0, one, point), (-1.0, other, point if second is None else second)):
+        for sign, name, at in ((1.0, body, point), (-1.0, other, point if second is None else second)):
             if name != GROUND:
                 arm = np.asarray(at) - self.places[name]
                 row[self._number(name)] += sign * np.concatenate([normal, np.cross(arm, normal)])
         self.springs.append((kind, row, stiffness))
 
-    def turn_spring(self, one: str, other: str, axis, stiffness: float) -> None:
+    def turn_spring(self, body: str, other: str, axis, stiffness: float) -> None:
         """Spring against the relative rotation of two bodies about an axis [N m/rad]."""
         row = np.zeros((len(self.places), 6))
-        for sign, name in ((1.0, one), (-1.0, other)):
+        for sign, name in ((1.0, body), (-1.0, other)):
             if name != GROUND:
                 row[self._number(name), 3:] += sign * np.asarray(axis)
         self.springs.append(("turn", row, stiffness))
 
-    def hold(self, one: str, other: str, point, *, radial=0.0, axial=0.0, tilt=0.0, torsion=0.0) -> None:
+    def hold(self, body: str, other: str, point, *, radial=0.0, axial=0.0, tilt=0.0, torsion=0.0) -> None:
         """Bearing between two bodies at a point: springs along x, y and z and about them."""
         for axis, along, about in zip(np.eye(3), (radial, radial, axial), (tilt, tilt, torsion), strict=True):
-            self.point_spring("pin" if other != GROUND else "support", one, other, point, axis, along)
-            self.turn_spring(one, other, axis, about)
+            self.point_spring("pin" if other != GROUND else "support", body, other, point, axis, along)
+            self.turn_spring(body, other, axis, about)
 
-    def mesh(self, kind, one, other, planet, base_radii, alpha, beta, stiffness, *, sense) -> None:
+    def mesh(self, kind, body, other, planet, base_radii, alpha, beta, stiffness, *, sense) -> None:
         """Mesh spring that presses `other` in the tangential sense +-1 seen from the carrier's centre.
 
         The normal into `other` leans outwards by the pressure angle; its feet on the base circles lie
@@ -82,9 +82,9 @@ class Network:
         sides = (1.0, -1.0) if other == planet else (1.0, 1.0)
         feet = [
             self.places[name] + side * radius * foot
-            for name, side, radius in zip((one, other), sides, base_radii, strict=True)
+            for name, side, radius in zip((body, other), sides, base_radii, strict=True)
         ]
-        self.point_spring(kind, one, other, feet[0], normal, stiffness, second=feet[1])
+        self.point_spring(kind, body, other, feet[0], normal, stiffness, second=feet[1])
 
     def matrices(self, axes=tuple(range(6)), held=()) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Mass (n,), stiffness (n, n) and the numbers (n,) of the coordinates that are left.

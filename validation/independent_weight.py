@@ -150,10 +150,10 @@ class Balance:
         for h in range(1, H + 1):
             a, b = h, H + h
             if wanted:
-                own, cross = -2.0 * h**2 * omega * np.diag(m.M), h * m.C
+                diagonal, cross = -2.0 * h**2 * omega * np.diag(m.M), h * m.C
             else:
-                own, cross = m.K - (h * omega) ** 2 * np.diag(m.M), h * omega * m.C
-            Z[a, :, a] = Z[b, :, b] = own
+                diagonal, cross = m.K - (h * omega) ** 2 * np.diag(m.M), h * omega * m.C
+            Z[a, :, a] = Z[b, :, b] = diagonal
             Z[a, :, b], Z[b, :, a] = cross, -cross
         return Z
 
@@ -255,7 +255,7 @@ def branch(
     tangent[-1] = way
     points, length = [(omega, c)], step
     low, high = 2.0 * math.pi * np.array([min(limits) - 1e-6, max(limits) + 1e-6])
-    while low <= omega <= high and len(points) < most and not (stop and stop([one for one, _ in points])):
+    while low <= omega <= high and len(points) < most and not (stop and stop([frequency for frequency, _ in points])):
         _, J, by_omega = balance.residual(c, omega)
         new = np.linalg.solve(
             np.vstack([np.column_stack([J * LENGTH, by_omega * TURN]), tangent]),
@@ -263,13 +263,13 @@ def branch(
         )
         tangent = new / np.linalg.norm(new)
         while True:
-            found = _corrected(balance, c, omega, tangent, length, scale)
-            if found is not None:
+            point = _corrected(balance, c, omega, tangent, length, scale)
+            if point is not None:
                 break
             length *= 0.5
             if length < 1e-7:
                 raise RuntimeError("the branch is lost")
-        c, omega, steps = found
+        c, omega, steps = point
         points.append((omega, c))
         length = min(step, length * (1.4 if steps <= 4 else 1.0))
     return np.array([omega for omega, _ in points]) / (2.0 * math.pi), np.array([c for _, c in points])

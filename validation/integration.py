@@ -28,7 +28,7 @@ END = 0.2650852834949518
 
 def marched_roots(ratio: float, method: str, **options) -> np.ndarray:
     """Roots (2,) of ``x_(k+2) = (z1 + z2) x_(k+1) - z1 z2 x_k``, which marched steps h / T = ratio obey."""
-    found = solve_transient(
+    motion = solve_transient(
         oscillator(stiffness=(2.0 * np.pi) ** 2),
         0.0,
         ratio * np.arange(40),
@@ -38,7 +38,7 @@ def marched_roots(ratio: float, method: str, **options) -> np.ndarray:
         **options,
     )
     # of Newmark's family the third root is zero: it acts in the first step only
-    x = found.displacement[2:, 0]
+    x = motion.displacement[2:, 0]
     first, second = np.linalg.lstsq(np.column_stack([x[1:-1], x[:-2]]), x[2:], rcond=None)[0]
     return np.roots([1.0, -first, -second]).astype(complex)
 
@@ -89,7 +89,7 @@ def stability_limits() -> tuple[Row, ...]:
         rows.append(printed("I2", HUGHES, f"{method}: limit of h/T, marched", value, limit))
         rows.append(printed("I2", HUGHES, f"{method}: limit of h/T, formula", value, stability_limit(rule)))
         problem, step = oscillator(stiffness=(2.0 * np.pi) ** 2), float(value)
-        found = solve_transient(
+        motion = solve_transient(
             problem,
             0.0,
             0.999 * step * np.arange(2001),
@@ -97,7 +97,7 @@ def stability_limits() -> tuple[Row, ...]:
             method=method,
             step=0.999 * step,
         )
-        largest = np.abs(found.displacement).max()
+        largest = np.abs(motion.displacement).max()
         rows.append(at_most("I2", "theory", f"{method}: largest motion at 0.999 of the limit", 100.0, largest))
         refused = 0
         try:
@@ -111,10 +111,10 @@ def stability_limits() -> tuple[Row, ...]:
 def forced_error(method: str, count: int, **options) -> float:
     """Error at t = 10 of the forced oscillator in ``count`` steps."""
     problem = oscillator(damping=0.1, stiffness=4.0, forces=[(1.0, (1,))])
-    found = solve_transient(
+    motion = solve_transient(
         problem, 3.0, [0.0, 10.0], start=([1.0], [0.0]), method=method, step=10.0 / count, **options
     )
-    return float(found.displacement[-1, 0] - END)
+    return float(motion.displacement[-1, 0] - END)
 
 
 def order() -> tuple[Row, ...]:
@@ -140,8 +140,8 @@ def order() -> tuple[Row, ...]:
         rows.append(within("I3", "theory", quantity, 2.0, np.log2(low / high), 0.01))
     problem = oscillator(damping=0.1, stiffness=4.0, forces=[(1.0, (1,))])
     for method in ("DOP853", "Radau", "LSODA"):
-        found = solve_transient(problem, 3.0, [0.0, 10.0], start=([1.0], [0.0]), method=method, tolerance=1e-9)
-        error = found.displacement[-1, 0] - END
+        motion = solve_transient(problem, 3.0, [0.0, 10.0], start=([1.0], [0.0]), method=method, tolerance=1e-9)
+        error = motion.displacement[-1, 0] - END
         rows.append(at_most("I3", closed, f"{method}, tolerance 1e-9: error", 1e-7, error))
     return tuple(rows)
 
@@ -149,14 +149,14 @@ def order() -> tuple[Row, ...]:
 def energy() -> tuple[Row, ...]:
     """I4: energy after 1e5 steps."""
     steps = 100_000
-    found = solve_transient(
+    motion = solve_transient(
         oscillator(stiffness=1.0),
         0.0,
         0.1 * np.array([0.0, 0.5 * steps, steps]),
         start=([1.0], [0.0]),
         step=0.1,
     )
-    total = (found.velocity**2 + found.displacement**2)[:, 0]
+    total = (motion.velocity**2 + motion.displacement**2)[:, 0]
     quantity = "average acceleration, 1e5 steps of 0.1: relative drift of the energy"
     return (at_most("I4", "theory: the rule keeps the energy", quantity, 5e-13, np.abs(total - 1.0).max()),)
 
@@ -172,10 +172,10 @@ def sweeps() -> tuple[Row, ...]:
         omega = branch.parameter[fold]
         number = round(abs(ends[1] - ends[0]) / width) + 1
         start = start_on(branch, ends[0], branch.folds, name)
-        found = sweep_response(duffing(), np.linspace(*ends, number), start=start, steps=200, most=300, tolerance=1e-4)
-        jumps = found.jumps(0.3)
+        sweep = sweep_response(duffing(), np.linspace(*ends, number), start=start, steps=200, most=300, tolerance=1e-4)
+        jumps = sweep.jumps(0.3)
         rows.append(counted("H2", "continuation", f"Duffing, sweep {name}: number of jumps", 1, len(jumps)))
-        ends_of_jump = found.frequency[[jumps[0], jumps[0] + 1]] if len(jumps) else np.full(2, np.nan)
+        ends_of_jump = sweep.frequency[[jumps[0], jumps[0] + 1]] if len(jumps) else np.full(2, np.nan)
         place, quantity = (
             ends_of_jump.mean(),
             f"Duffing, sweep {name} in steps of {width:g}: frequency of the jump",

@@ -153,13 +153,13 @@ def more_torque() -> tuple[Row, ...]:
             )
             for sign in (-1, 1)
         )
-        mean = [one.resampled("deflection", 8192).mean(axis=1) for one in (less, more)]
-        force = [one.resampled("force", 8192).mean(axis=1) for one in (less, more)]
-        found = [_mean_motion(modes, 1 + sign * step) for sign in (-1, 1)]
+        mean = [record.resampled("deflection", 8192).mean(axis=1) for record in (less, more)]
+        force = [record.resampled("force", 8192).mean(axis=1) for record in (less, more)]
+        motions = [_mean_motion(modes, 1 + sign * step) for sign in (-1, 1)]
         N = len(mean[0]) // 2
         for kind, mesh in (("sun-planet", 0), ("planet-ring", N)):
             statically = (force[1] - force[0])[mesh] / (mean[1] - mean[0])[mesh]
-            dynamically = (found[1][1] - found[0][1])[mesh] / (found[1][0] - found[0][0])[mesh]
+            dynamically = (motions[1][1] - motions[0][1])[mesh] / (motions[1][0] - motions[0][0])[mesh]
             quantity = f"{name}, {kind}: change of force over change of mean deflection [N/um]"
             rows.append(
                 within(

@@ -92,10 +92,10 @@ def relief() -> tuple[Row, ...]:
     for torque in (50.0, 200.0):
         rows.append(at_most("relief", "Harris map", f"100 N m over {torque:g} N m", 1.0, ratio[100.0] / ratio[torque]))
     pins = np.array([[2e-6, 5e-6], [-1e-6, 0.0], [3e-6, -2e-6]])
-    one = _walk(pins=pins)
+    record = _walk(pins=pins)
     two = _walk(torque=-TORQUE, pins=pins[[0, 2, 1]] * np.array([1.0, -1.0]))
     turned = two.force[[0, 2, 1, 3, 5, 4]][:, -np.arange(16) % 16]
-    error = np.abs(turned - one.force).max() / one.force.max()
+    error = np.abs(turned - record.force).max() / record.force.max()
     rows.append(at_most("reversal", "mirror image", "-100 N m with mirrored errors: forces, relative", 1e-9, error))
     return tuple(rows)
 

@@ -46,17 +46,17 @@ def planet_passage() -> tuple[Row, ...]:
         angles = 2 * np.pi * np.arange(planets) / planets
         harmonics = phased_harmonics([0.0, 1.0], z_ring * angles / (2 * np.pi))
         field = hanning_model(harmonics, angles, width=2 * np.pi, n_max=2)
-        heard = np.abs(fixed_sensor_lines(field, z_ring, 1.0, 0.0).displacement)
+        amplitudes = np.abs(fixed_sensor_lines(field, z_ring, 1.0, 0.0).displacement)
         name = f"ring {z_ring}, {planets} planets: "
-        rows.append(within("J2", source, name + f"line at order {order}", value, heard[order], 1e-12))
-        rows.append(at_most("J2", source, name + "largest other line", 1e-9, np.delete(heard, order).max()))
+        rows.append(within("J2", source, name + f"line at order {order}", value, amplitudes[order], 1e-12))
+        rows.append(at_most("J2", source, name + "largest other line", 1e-9, np.delete(amplitudes, order).max()))
     return tuple(rows)
 
 
 def _component(n, n_max=24, harmonic=1):
     field = np.zeros((harmonic + 1, 2 * n_max + 1), dtype=complex)
-    for one in np.atleast_1d(n):
-        field[harmonic, n_max + one] = 1.0
+    for diameter in np.atleast_1d(n):
+        field[harmonic, n_max + diameter] = 1.0
     return field
 
 
@@ -112,15 +112,15 @@ def lobes() -> tuple[Row, ...]:
     """Lobes of the envelope: a ring pattern of three waves against the Hanning model of three planets."""
     lines = fixed_sensor_lines(_component([-3, 3]), Z_RING, 1.0, 0.0)
     band = analyse_band(OrderSpectrum(lines.order, lines.displacement), Z_RING, 1)
-    heard = sorted(int(line.order) for line in band.lines)
+    orders = sorted(int(line.order) for line in band.lines)
     angles = 2 * np.pi * np.arange(3) / 3
     field = hanning_model(phased_harmonics([0.0, 1.0], Z_RING * angles / (2 * np.pi)), angles)
     model = fixed_sensor_lines(field, Z_RING, 1.0, 0.0)
     hanning = analyse_band(OrderSpectrum(model.order, model.displacement), Z_RING, 1)
     source = "|cos 3 phi| has six maxima a revolution"
     return (
-        counted("lobes", "order h z_ring - n", "ring pattern n = -3, 3: lower line", Z_RING - 3, heard[0]),
-        counted("lobes", "order h z_ring - n", "ring pattern n = -3, 3: upper line", Z_RING + 3, heard[-1]),
+        counted("lobes", "order h z_ring - n", "ring pattern n = -3, 3: lower line", Z_RING - 3, orders[0]),
+        counted("lobes", "order h z_ring - n", "ring pattern n = -3, 3: upper line", Z_RING + 3, orders[-1]),
         counted("lobes", source, "ring pattern n = -3, 3: lobes", 6, len(band.lobes.position)),
         counted("lobes", "one window a planet", "Hanning model, 3 planets: lobes", 3, len(hanning.lobes.position)),
     )

@@ -217,15 +217,15 @@ def mortar_contacts(places, loads, *, centre: float, base_radius: float, factors
         _compliance(body, np.hstack(columns), factor)
         for body, columns, factor in zip(places[0][:2], nodal, factors, strict=True)
     )
-    found, splits = [], np.cumsum([len(gap) for gap in gaps])[:-1]
+    separations, splits = [], np.cumsum([len(gap) for gap in gaps])[:-1]
     for load in loads:
         approach, pressure = _active_set(H, np.concatenate(gaps), np.concatenate(arms), load)
         each = np.split(pressure, splits)
         outer = (p[k] for p in each for k in (0, -1))
-        if any(one > 0 and not at for at, one in zip(ends, outer, strict=True)):
+        if any(force > 0 and not at for at, force in zip(ends, outer, strict=True)):
             raise ContactError("the contact runs out of the edges that may touch", code="E-CONTACT")
-        found.append((approach, each))
-    return found
+        separations.append((approach, each))
+    return separations
 
 
 def _active_set(H, gap, arm, load):

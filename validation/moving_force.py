@@ -180,10 +180,10 @@ def run(route: str, steps: int, **options) -> Run:
     case = moving_force()
     times = case.times(steps)
     if route in ("average acceleration", "generalised alpha"):
-        found = solve_transient(case.damped, case.carrier, times, method=route, step=times[1], **options)
+        motion = solve_transient(case.damped, case.carrier, times, method=route, step=times[1], **options)
         unknowns = len(case.damped.system.M)
     else:
-        found = solve_force_history(
+        motion = solve_force_history(
             case.problem.system,
             times,
             case.force(times),
@@ -192,8 +192,8 @@ def run(route: str, steps: int, **options) -> Run:
             mesh_stiffness=np.zeros(1),
             **options,
         )
-        unknowns = found.unknowns
-    return Run(route, steps, unknowns, _error(case, times, steps, found.displacement))
+        unknowns = motion.unknowns
+    return Run(route, steps, unknowns, _error(case, times, steps, motion.displacement))
 
 
 def _error(case: MovingForce, times, steps, displacement) -> float:
@@ -231,9 +231,9 @@ def table() -> tuple[Row, ...]:
     """Errors of all routes, and the orders that theory gives them."""
     runs = {(route, steps, *more.values()): run(route, steps, **more) for route, steps, more in TABLE}
     source, rows = "closed form in every mode", []
-    for found in runs.values():
-        name = f"{NAMES[found.name].format(found.unknowns)}, {found.steps} steps a mesh period: error"
-        rows.append(information("moving", source, name, None, found.error))
+    for motion in runs.values():
+        name = f"{NAMES[motion.name].format(motion.unknowns)}, {motion.steps} steps a mesh period: error"
+        rows.append(information("moving", source, name, None, motion.error))
     newmark = [runs["average acceleration", steps].error for steps in (64, 128, 256)]
     duhamel = [runs["modal", steps].error for steps in (64, 256)]
     same = abs(runs["full", 64].error - runs["modal", 64].error)

@@ -54,13 +54,13 @@ def ratios() -> tuple[Row, ...]:
     case, exact = four_stage_case(), Fraction(1)
     for stage in case.planetary:
         exact *= 1 + Fraction(stage.gears.teeth[2], stage.gears.teeth[0])
-    flow, found = gearbox_flow(case), solve_deflection(case)
+    flow, state = gearbox_flow(case), solve_deflection(case)
     speed, torque = case.load_case.speed["stage 1 sun"], case.load_case.torque["stage 1 sun"]
     source, output = "product of 1 + z_r / z_s, exact", flow.port_torque["stage 4 carrier"]
     mesh = case.planetary[-1].gears.teeth[2] * speed / float(exact) / (2.0 * math.pi)
-    last = found.model.stages[-1]
+    last = state.model.stages[-1]
     sun, _, ring = last.sizes.base_radii
-    lumped = -found.mesh_force[list(last.meshes)].sum() / 2.0 * (sun + ring)
+    lumped = -state.mesh_force[list(last.meshes)].sum() / 2.0 * (sun + ring)
     ratio = flow.speed["stage 1 sun"] / flow.speed["stage 4 carrier"]
     return (
         within("MS", source, "four stages: ratio of the speeds", float(exact), ratio, 1e-12),
@@ -107,13 +107,13 @@ def uncoupled() -> tuple[Row, ...]:
     rows = []
     for planets in (3, 4, 5):
         data = lin_parker_set(planets)
-        found, single = modes_of(read_case(side_by_side(data))), gear_set_modes(data)
+        modes, single = modes_of(read_case(side_by_side(data))), gear_set_modes(data)
         elastic = single.frequency > 0.0
-        error = np.abs(np.sort(found.modes.frequency)[2:] / np.repeat(single.frequency[elastic], 2) - 1.0).max()
+        error = np.abs(np.sort(modes.modes.frequency)[2:] / np.repeat(single.frequency[elastic], 2) - 1.0).max()
         name = f"two uncoupled stages of {planets} planets: "
         rows.append(at_most("MS", "modes of one stage", name + "largest relative difference", 1e-10, error))
-        own = Counter(found.stages.kinds) == {kind: 2 * n for kind, n in Counter(single.kind).items()}
-        rows.append(counted("MS", "modes of one stage", name + "every kind twice", 1, int(own)))
+        same_kinds = Counter(modes.stages.kinds) == {kind: 2 * n for kind, n in Counter(single.kind).items()}
+        rows.append(counted("MS", "modes of one stage", name + "every kind twice", 1, int(same_kinds)))
     return tuple(rows)
 
 
@@ -141,21 +141,21 @@ def planets_of(stage: StageModel, stiffness: tuple[float, float]) -> PlanarSet:
 
 def structure() -> tuple[Row, ...]:
     """Kinds of the modes of the coupled four-stage example."""
-    found = modes_of(four_stage_case())
-    kinds = Counter(found.stages.kinds)
+    modes = modes_of(four_stage_case())
+    kinds = Counter(modes.stages.kinds)
     rotational, name = kinds["rotational"] + kinds["rigid"], "four stages: "
     rows = [
         counted("MS", STRUCTURE, name + "rotational modes, one rigid", 24, rotational),
         counted("MS", STRUCTURE, name + "translational modes", 48, kinds["translational"]),
         counted("MS", STRUCTURE, name + "planet modes, 3 (N - 3) a stage", 6, kinds["planet"]),
     ]
-    planet, main = np.array(found.stages.kinds) == "planet", found.stages.energy.argmax(axis=0) + 1
+    planet, main = np.array(modes.stages.kinds) == "planet", modes.stages.energy.argmax(axis=0) + 1
     for number in (3, 4):
-        stage = found.deflection.model.stages[number - 1]
+        stage = modes.deflection.model.stages[number - 1]
         meshes = stage.section.sun_mesh.stiffness, stage.section.ring_mesh.stiffness
         alone = gear_set_modes(planets_of(stage, meshes))
-        own = alone.frequency[np.array(alone.kind) == "planet"]
-        error = np.abs(found.modes.frequency[planet & (main == number)] / own - 1.0).max()
+        planet_frequencies = alone.frequency[np.array(alone.kind) == "planet"]
+        error = np.abs(modes.modes.frequency[planet & (main == number)] / planet_frequencies - 1.0).max()
         name = f"planet modes of stage {number}, coupled and alone: relative difference"
         rows.append(at_most("MS", STRUCTURE, name, 1e-9, error))
     return tuple(rows)
@@ -213,54 +213,54 @@ class Excited:
 
     Parameters
     ----------
-    found : Deflection
+    state : Deflection
         Loaded state.
     stage : StageModel
     excitation : MeshExcitation
     """
 
-    found: Deflection
+    state: Deflection
     stage: StageModel
     excitation: MeshExcitation
 
     @property
     def mesh(self) -> float:
         """Mesh frequency at the speed of operation [rad/s]."""
-        return 2.0 * math.pi * self.found.model.flow.mesh_frequency[self.stage.name]
+        return 2.0 * math.pi * self.state.model.flow.mesh_frequency[self.stage.name]
 
     @property
     def carrier(self) -> float:
         """Speed of the carrier there [rad/s]."""
-        return abs(self.found.model.flow.speed[self.stage.section.carrier])
+        return abs(self.state.model.flow.speed[self.stage.section.carrier])
 
     def response(self, factor: float, carrier: float, harmonics: tuple[int, int]) -> tuple[RunningResponse, np.ndarray]:
         """Response at a factor of the speed of operation, and forces (Q + 1, S, M) of all but its own meshes."""
-        structured = running_stage(self.found, self.stage, self.excitation)
-        known = {"harmonics": harmonics, "side_bands": 4 if carrier else 0, "tolerance": 1e-13}
-        response = solve_running(structured.running, factor * self.mesh, carrier, **known)
-        approach = mesh_rows(self.found.model, self.stage.meshes) @ structured.motion
-        loss = 1.0 + 2j * self.found.model.case.modes.damping_ratio
-        return response, loss * response.lines(approach.T) * mesh_stiffness(self.found)
+        structured = running_stage(self.state, self.stage, self.excitation)
+        options = {"harmonics": harmonics, "side_bands": 4 if carrier else 0, "tolerance": 1e-13}
+        response = solve_running(structured.running, factor * self.mesh, carrier, **options)
+        approach = mesh_rows(self.state.model, self.stage.meshes) @ structured.motion
+        loss = 1.0 + 2j * self.state.model.case.modes.damping_ratio
+        return response, loss * response.lines(approach.T) * mesh_stiffness(self.state)
 
     def lines(self, factor: float, carrier: float, harmonics: tuple[int, int]) -> np.ndarray:
         """Lines (meshes, Q + 1) of the meshes with planet 1 at the mesh harmonics, sun and ring, stage by stage."""
         response, others = self.response(factor, carrier, harmonics)
         middle = list(response.band).index(0)
-        first = first_meshes(self.found)
-        found = others[:, middle].T[first].copy()
+        first = first_meshes(self.state)
+        mixed = others[:, middle].T[first].copy()
         at, planets = first.index(self.stage.meshes[0]), response.force.shape[3] // 2
-        found[at : at + 2] = 2.0 * response.force[0, :2, :, planets]
-        return found
+        mixed[at : at + 2] = 2.0 * response.force[0, :2, :, planets]
+        return mixed
 
 
-def mesh_stiffness(found: Deflection) -> np.ndarray:
+def mesh_stiffness(state: Deflection) -> np.ndarray:
     """Mean stiffness of all meshes [N/m]."""
-    return np.array([contact.stiffness.sum() for contact in found.model.assembly.contacts])
+    return np.array([contact.stiffness.sum() for contact in state.model.assembly.contacts])
 
 
-def first_meshes(found: Deflection) -> list[int]:
+def first_meshes(state: Deflection) -> list[int]:
     """Meshes of planet 1 with sun and ring of every stage."""
-    return [mesh for stage in found.model.stages for mesh in (stage.meshes[0], stage.meshes[len(stage.planets)])]
+    return [mesh for stage in state.model.stages for mesh in (stage.meshes[0], stage.meshes[len(stage.planets)])]
 
 
 def loaded(*, lateral: bool = True, damping: float = 0.03) -> Deflection:
@@ -268,36 +268,36 @@ def loaded(*, lateral: bool = True, damping: float = 0.03) -> Deflection:
     return solve_deflection(with_values(four_stage_case(lateral=lateral), {"modes.damping_ratio": damping}))
 
 
-def with_errors(found: Deflection, number: int) -> Excited:
+def with_errors(state: Deflection, number: int) -> Excited:
     """A stage of constant stiffness with the transmission errors of its loaded meshes, three harmonics."""
-    stage = found.model.stages[number - 1]
+    stage = state.model.stages[number - 1]
     first = complex_numbers(stored()["errors"][str(number)])
     count, planets = 48 * len(stage.planets), len(stage.planets)
     ahead = mesh_phases(stage.sizes)
     ahead = ahead - ahead[[0] * planets + [planets] * planets]
     lines = np.repeat(first, planets, axis=0) * np.exp(2j * np.pi * np.outer(ahead, [1, 2, 3]))
     deflection = sample(np.column_stack([np.zeros(2 * planets), lines]), count)
-    stiffness = np.broadcast_to(mesh_stiffness(found)[list(stage.meshes)][:, None], deflection.shape)
-    force = np.full(deflection.shape, found.mesh_force[stage.meshes[0]])
-    return Excited(found, stage, MeshExcitation(stiffness, deflection, force, np.zeros(2 * planets)))
+    stiffness = np.broadcast_to(mesh_stiffness(state)[list(stage.meshes)][:, None], deflection.shape)
+    force = np.full(deflection.shape, state.mesh_force[stage.meshes[0]])
+    return Excited(state, stage, MeshExcitation(stiffness, deflection, force, np.zeros(2 * planets)))
 
 
-def with_pairs(found: Deflection, number: int, harmonics: int = 3) -> Excited:
+def with_pairs(state: Deflection, number: int, harmonics: int = 3) -> Excited:
     """A stage with so many harmonics of its stiffness by the number of tooth pairs."""
-    stage = found.model.stages[number - 1]
-    whole = excitation_of(found, stage)
+    stage = state.model.stages[number - 1]
+    whole = excitation_of(state, stage)
     cut = {
         name: sample(harmonics_of(getattr(whole, name), harmonics), whole.force.shape[1])
         for name in ("stiffness", "force")
     }
-    return Excited(found, stage, replace(whole, **cut))
+    return Excited(state, stage, replace(whole, **cut))
 
 
 def direct_lines(excited: Excited, factor: float) -> np.ndarray:
     """Lines (meshes, 3) by errors of one stage from the whole linear gearbox, planets where they stand."""
-    found, count = excited.found, excited.excitation.force.shape[1]
-    _, system, stiffness = linear_system(found)
-    loss = 1.0 + 2j * found.model.case.modes.damping_ratio
+    state, count = excited.state, excited.excitation.force.shape[1]
+    _, system, stiffness = linear_system(state)
+    loss = 1.0 + 2j * state.model.case.modes.damping_ratio
     errors = np.zeros((len(stiffness), 3), complex)
     errors[list(excited.stage.meshes)] = 2.0 / count * np.fft.fft(excited.excitation.deflection, axis=1)[:, 1:4]
     whole = loss * (system.K + (system.W * stiffness) @ system.W.T)
@@ -307,14 +307,14 @@ def direct_lines(excited: Excited, factor: float) -> np.ndarray:
         motion = np.linalg.solve(dynamic, system.W @ (stiffness * errors[:, h - 1]))
         # as the stage has them: the stiffness before an error has no loss
         lines[:, h - 1] = stiffness * (loss * (system.W.T @ motion) - errors[:, h - 1])
-    return lines[first_meshes(found)]
+    return lines[first_meshes(state)]
 
 
 def response() -> tuple[Row, ...]:
     """Every stage in the structure of the rest, by transmission errors."""
-    rows, found, soft = [], loaded(), loaded(lateral=False)
+    rows, state, soft = [], loaded(), loaded(lateral=False)
     for number in (1, 2, 3, 4):
-        stage = with_errors(found, number)
+        stage = with_errors(state, number)
         worst = dict.fromkeys(("direct", "soft"), 0.0)
         for factor in np.linspace(0.3, 1.2, 5).tolist():
             lines, direct = stage.lines(factor, 0.0, (3, 3))[:, 1:], direct_lines(stage, factor)
@@ -336,24 +336,24 @@ def former_modes() -> tuple[Row, ...]:
         ("four stages", "modes", four_stage_case()),
         ("published table", "published", published_case(planets=3)),
     ):
-        found, expected = modes_of(case), np.array(former[key]["frequency"])
+        modes, expected = modes_of(case), np.array(former[key]["frequency"])
         elastic = expected > 0.0
-        error = np.abs(np.sort(found.modes.frequency)[elastic] / expected[elastic] - 1.0).max()
+        error = np.abs(np.sort(modes.modes.frequency)[elastic] / expected[elastic] - 1.0).max()
         rows.append(at_most("MS", FORMER, f"{name}: natural frequencies, largest relative difference", 1e-9, error))
-        same = Counter(found.stages.kinds) == Counter(former[key]["kind"])
+        same = Counter(modes.stages.kinds) == Counter(former[key]["kind"])
         rows.append(counted("MS", FORMER, f"{name}: as many modes of every kind", 1, int(same)))
         if key == "modes":
-            apart = np.abs(found.stages.energy.max(axis=0) - former[key]["share"]).max()
+            apart = np.abs(modes.stages.energy.max(axis=0) - former[key]["share"]).max()
             rows.append(at_most("MS", FORMER, f"{name}: share of a mode's main stage, largest difference", 1e-9, apart))
     return tuple(rows)
 
 
 def former_response() -> tuple[Row, ...]:
     """Mesh forces of all stages beside those of the former train, without losses."""
-    rows, former, found = list[Row](), stored(), loaded(damping=NO_LOSS)
-    speeds = np.array(former["error_response"]["speed"]) / found.model.flow.speed["stage 1 sun"]
+    rows, former, state = list[Row](), stored(), loaded(damping=NO_LOSS)
+    speeds = np.array(former["error_response"]["speed"]) / state.model.flow.speed["stage 1 sun"]
     for number in (1, 2, 3, 4):
-        stage = with_errors(found, number)
+        stage = with_errors(state, number)
         expected = complex_numbers(former["error_response"]["force"][str(number)])
         worst = max(
             np.abs(stage.lines(factor, 0.0, (3, 3))[:, 1:].T - lines).max() / np.abs(lines).max()
@@ -362,7 +362,7 @@ def former_response() -> tuple[Row, ...]:
         name = f"lines by errors of stage {number}, planets standing: largest difference over the largest"
         rows.append(at_most("MS", FORMER, name, 1e-6, worst))
         expected = complex_numbers(former["one_stage"][str(number)])[:, 1:]
-        pairs = with_pairs(found, number)
+        pairs = with_pairs(state, number)
         for text, carrier, gate in (("planets standing", 0.0, 1e-6), ("planets running around", pairs.carrier, 1e-2)):
             lines = pairs.lines(1.0, carrier, (3, 12))[:, 1 : expected.shape[1] + 1]
             name = f"lines by k(t) of stage {number}, {text}: largest difference over the largest"
@@ -376,17 +376,17 @@ def turning_frames() -> tuple[Row, ...]:
     """A mesh with an error of its own: how sun 2 feels the centre of carrier 1, which runs around."""
     tables, former = first_stages(2), stored()["turning"]["1e-07"]
     tables["modes"]["damping_ratio"] = 1e-7
-    found = solve_deflection(read_case(tables))
-    stage, count = found.model.stages[0], 48
-    stiffness = np.repeat(mesh_stiffness(found)[list(stage.meshes)][:, None], count, axis=1)
+    state = solve_deflection(read_case(tables))
+    stage, count = state.model.stages[0], 48
+    stiffness = np.repeat(mesh_stiffness(state)[list(stage.meshes)][:, None], count, axis=1)
     error = np.zeros((6, count))
     error[0] = 5e-6 * np.cos(2.0 * np.pi * np.arange(count) / count)
-    excitation = MeshExcitation(stiffness, error, np.full((6, count), found.mesh_force[0]), np.zeros(6))
-    structured = running_stage(found, stage, excitation)
+    excitation = MeshExcitation(stiffness, error, np.full((6, count), state.mesh_force[0]), np.zeros(6))
+    structured = running_stage(state, stage, excitation)
     paths = replace(structured.running.paths, symmetry=1)
     running = replace(structured.running, excitation=excitation, paths=paths)
-    excited = Excited(found, stage, excitation)
-    approach = mesh_rows(found.model, stage.meshes) @ structured.motion
+    excited = Excited(state, stage, excitation)
+    approach = mesh_rows(state.model, stage.meshes) @ structured.motion
     rows = list[Row]()
     standing = solve_running(running, excited.mesh, 0.0, harmonics=(1, 1), side_bands=0)
     for kind, mesh, reference in zip((0, 1), ("sun-planet 1", "planet 1-ring"), np.array(former["rest"])[[0, 2]]):
@@ -395,7 +395,7 @@ def turning_frames() -> tuple[Row, ...]:
             within("MS", FORMER, f"an error of one mesh, standing: {mesh} of stage 1 [N]", reference, value, 1e-6)
         )
     response = solve_running(running, excited.mesh, excited.carrier, harmonics=(1, 1), side_bands=4)
-    lines = np.abs(response.lines(approach.T)[1] * mesh_stiffness(found))
+    lines = np.abs(response.lines(approach.T)[1] * mesh_stiffness(state))
     note = "in the frame of carrier 2 these lines lie 0.8 Hz nearer to the mesh frequency"
     for place, text in enumerate(("one turn below", "at the mesh frequency", "one turn above")):
         band = list(response.band).index(place - 1)
@@ -411,26 +411,26 @@ class AtOnce:
 
     Parameters
     ----------
-    found : Deflection
+    state : Deflection
         Loaded state.
     system : MechanicalSystem
         About that state, all modes with a damping ratio of 0.03.
     """
 
-    found: Deflection
+    state: Deflection
     system: MechanicalSystem
 
     def solve(self, factor: float, orders: Iterable[np.ndarray], only: int | None = None) -> PeriodicSolution:
         """Lines of all meshes at a factor of the speed of operation; k(t) of one stage ``only``, by its number."""
-        elements, stages = [], self.found.model.stages
+        elements, stages = [], self.state.model.stages
         for number, stage in enumerate(stages, 1):
-            lines = harmonics_of(with_pairs(self.found, number).excitation.stiffness, 3)
+            lines = harmonics_of(with_pairs(self.state, number).excitation.stiffness, 3)
             lines[:, 1:] *= only in (None, number)
             series = FourierSeries(lines)
             base = orders_of(number - 1, len(stages), 1)
             series = replace(series, orders=tuple(series.orders[0] * order for order in base))
             elements.append(GearMeshes(np.array(stage.meshes), series, separates=False))
-        mesh = [2.0 * math.pi * factor * self.found.model.flow.mesh_frequency[stage.name] for stage in stages]
+        mesh = [2.0 * math.pi * factor * self.state.model.flow.mesh_frequency[stage.name] for stage in stages]
         problem = NonlinearSystem(self.system, tuple(elements))
         solution = solve_harmonic_balance(problem, np.array(mesh), orders=distinct_lines(orders), stability=False)
         assert solution.converged
@@ -438,31 +438,34 @@ class AtOnce:
 
     def pressed(self, solution: PeriodicSolution, stage: StageModel) -> dict[tuple[int, ...], np.ndarray]:
         """Forces (M,) of the meshes of a stage beyond their mean stiffness, line by line."""
-        own = list(stage.meshes)
-        beyond = solution.force[own] - mesh_stiffness(self.found)[own, None] * solution.deflection[own]
+        rows_of_stage = list(stage.meshes)
+        beyond = (
+            solution.force[rows_of_stage]
+            - mesh_stiffness(self.state)[rows_of_stage, None] * solution.deflection[rows_of_stage]
+        )
         return {tuple(order.tolist()): beyond[:, line] for line, order in enumerate(solution.orders) if order.any()}
 
 
 def at_once() -> AtOnce:
     """Assemble the example about its loaded state."""
-    found = loaded()
-    system, stiffness = linear_system(found)[1:]
-    load = found.model.assembly.motions.T @ found.model.load
+    state = loaded()
+    system, stiffness = linear_system(state)[1:]
+    load = state.model.assembly.motions.T @ state.model.load
     still = replace(system, gyroscopic=None, load=load)
-    return AtOnce(found, replace(still, C=viscous_damping(still, stiffness, 0.03)))
+    return AtOnce(state, replace(still, C=viscous_damping(still, stiffness, 0.03)))
 
 
 def balance() -> tuple[Row, ...]:
     """All stages with k(t) at once by harmonic balance, beside the former train and beside stage by stage."""
     rows, example = list[Row](), at_once()
-    stages = example.found.model.stages
+    stages = example.state.model.stages
     note = "structural damping beside that of modes"
     for text, entry in stored()["balance"].items():
         factor = float(text)
         solution = example.solve(factor, [np.array(line) for line in entry["orders"] if any(line)])
         force = solution.force[[stage.meshes[0] for stage in stages]][:, 1:]
         exact = np.sqrt(0.5 * (np.abs(force) ** 2).sum(axis=1))
-        response = solve_gearbox_response(example.found, [factor * 50.0 * math.pi])
+        response = solve_gearbox_response(example.state, [factor * 50.0 * math.pi])
         one_by_one = np.sqrt((response.mesh_forces[0] ** 2).sum(axis=1))
         for number, (stage, reference) in enumerate(zip(stages, entry["rms"], strict=True)):
             speed, alone = f"{1500 * factor:.0f} rpm", one_by_one[stage.meshes[0]]
@@ -475,18 +478,18 @@ def balance() -> tuple[Row, ...]:
 
 def balance_running() -> tuple[Row, ...]:
     """The same with planets that run around: all stages as elements of the nonlinear gearbox, flanks held together."""
-    rows, found, entry = list[Row](), loaded(), stored()["balance"]["1.0"]
-    stages = found.model.stages
-    excitations = {stage.name: with_pairs(found, number).excitation for number, stage in enumerate(stages, 1)}
-    box = nonlinear_gearbox(found, excitations, harmonics=3, separates=False, mean_damping=False)
+    rows, state, entry = list[Row](), loaded(), stored()["balance"]["1.0"]
+    stages = state.model.stages
+    excitations = {stage.name: with_pairs(state, number).excitation for number, stage in enumerate(stages, 1)}
+    box = nonlinear_gearbox(state, excitations, harmonics=3, separates=False, mean_damping=False)
     meshes = [box.bases.index(f"{stage.name} mesh") for stage in stages]
     orders = np.zeros((len(entry["orders"]), len(box.bases)), int)
     orders[:, meshes] = entry["orders"]
     # products of three harmonics by three; equal planets load no shaft across, whose waves carriers would turn
     phases = np.ones(len(box.bases), int)
     phases[meshes] = 10
-    known = {"orders": distinct_lines(orders[orders.any(axis=1)]), "samples": tuple(phases.tolist())}
-    solution = solve_harmonic_balance(box.problem, box.frequency, stability=False, **known)
+    options = {"orders": distinct_lines(orders[orders.any(axis=1)]), "samples": tuple(phases.tolist())}
+    solution = solve_harmonic_balance(box.problem, box.frequency, stability=False, **options)
     assert solution.converged
     theta = 2.0 * np.pi * np.indices(phases).reshape(len(phases), -1).T / phases
     wave = np.exp(1j * theta @ solution.orders.T)
@@ -505,20 +508,20 @@ def left_out() -> tuple[Row, ...]:
     """What W-CROSS says of every stage, beside k(t) of all of them at once with sums and differences of their lines."""
     rows, example, unit = list[Row](), at_once(), np.eye(4, dtype=int)
     single = [[h * base for h in (1, 2, 3)] for base in unit]
-    orders = [order for own in single for order in own]
+    orders = [order for orders_of_stage in single for order in orders_of_stage]
     orders += [
         first + sign * second
-        for a, own in enumerate(single)
+        for a, orders_of_stage in enumerate(single)
         for other in single[:a]
-        for first in own
+        for first in orders_of_stage
         for second in other
         for sign in (-1, 1)
     ]
     for factor in (0.7, 1.0):
         whole = example.solve(factor, orders)
-        response = solve_gearbox_response(example.found, [factor * 50.0 * math.pi])
+        response = solve_gearbox_response(example.state, [factor * 50.0 * math.pi])
         shares = np.sqrt((response.cross_excitation[0] ** 2).sum(axis=1))
-        for number, stage in enumerate(example.found.model.stages):
+        for number, stage in enumerate(example.state.model.stages):
             alone = example.pressed(example.solve(factor, single[number], number + 1), stage)
             lines = [force - alone.get(order, 0.0) for order, force in example.pressed(whole, stage).items()]
             exact = np.sqrt(0.5 * (np.abs(lines) ** 2).sum(axis=0)).reshape(2, -1).max(axis=1)

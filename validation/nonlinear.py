@@ -44,8 +44,8 @@ MOTIONS = (
 
 def oscillator(*elements, damping=0.0, stiffness=0.0, load=0.0, forces=()) -> NonlinearSystem:
     """Unit mass with springs; ``forces`` are pairs of complex force and orders."""
-    one = np.ones((1, 1))
-    system = MechanicalSystem(one, damping * one, stiffness * one, one, np.array([load]), ("x",))
+    unit = np.ones((1, 1))
+    system = MechanicalSystem(unit, damping * unit, stiffness * unit, unit, np.array([load]), ("x",))
     return NonlinearSystem(system, elements, tuple(HarmonicForce([f], orders) for f, orders in forces))
 
 
@@ -93,7 +93,7 @@ def free_duffing() -> tuple[Row, ...]:
         (5.0, "4.3574618565228"),
     ):
         guess = np.sqrt(1.0 + 0.75 * amplitude**2)
-        found = solve_free_vibration(problem, ([amplitude], [0.0]), 2 * np.pi / guess, harmonics=1)
+        vibration = solve_free_vibration(problem, ([amplitude], [0.0]), 2 * np.pi / guess, harmonics=1)
         start = np.zeros((1, 26), complex)
         start[0, 1] = amplitude
         _, omega = balanced_at_condition(
@@ -102,7 +102,7 @@ def free_duffing() -> tuple[Row, ...]:
         name = f"free Duffing, A = {amplitude:g}: frequency by"
         rows += [
             within("H1", ELLIPTIC, f"{name} harmonic balance, 25 harmonics", float(value), omega, 1e-12),
-            within("H1", ELLIPTIC, f"{name} shooting", float(value), found.solution.frequency[0], 1e-10),
+            within("H1", ELLIPTIC, f"{name} shooting", float(value), vibration.solution.frequency[0], 1e-10),
         ]
     start = np.array([[0.0, 1.0]], complex)
     _, omega = balanced_at_condition(harmonic_balance(problem, harmonics=1), start, 1.3, lambda x: x.real.sum() - 1.0)
@@ -129,9 +129,9 @@ def limit_points() -> tuple[Row, ...]:
         branch = response_curve(harmonics)
         for index, (omega, amplitude), name in zip(branch.folds, folds, ("upper", "lower"), strict=True):
             name = f"Duffing, {harmonics} harmonics: {name} fold,"
-            found = branch.parameter[index], first(branch.lines[index])
-            rows.append(within("H2", NLVIB, f"{name} frequency", float(omega), found[0], 1e-9))
-            rows.append(within("H2", NLVIB, f"{name} first harmonic", float(amplitude), found[1], 1e-8))
+            frequency = branch.parameter[index], first(branch.lines[index])
+            rows.append(within("H2", NLVIB, f"{name} frequency", float(omega), frequency[0], 1e-9))
+            rows.append(within("H2", NLVIB, f"{name} first harmonic", float(amplitude), frequency[1], 1e-8))
     branch = response_curve(11)
     upper, lower = branch.folds
     wrong = ~branch.stable[:upper], branch.stable[upper + 1 : lower], ~branch.stable[lower + 1 :]
@@ -189,15 +189,15 @@ def three_motions() -> tuple[Row, ...]:
     for name, amplitude, *multipliers in MOTIONS:
         lines = np.zeros((1, 16), complex)
         lines[0, 1] = one_harmonic(float(amplitude), 1.2)
-        found = solve_harmonic_balance(duffing(), 1.2, harmonics=15, start=lines)
+        solution = solve_harmonic_balance(duffing(), 1.2, harmonics=15, start=lines)
         shot = shooting_motion(float(amplitude))
-        known = floquet_verdict(duffing(), found, tolerance=1e-11)
-        hill = hill_verdict(duffing(), found)
+        floquet = floquet_verdict(duffing(), solution, tolerance=1e-11)
+        hill = hill_verdict(duffing(), solution)
         stable = int(name != "middle")
         label = f"Duffing, Omega = 1.2, {name} solution:"
         for route, deflection, values, verdict in (
-            ("harmonic balance", found.deflection, known.multipliers, known.stable),
-            ("Hill's method", found.deflection, hill.multipliers, hill.stable),
+            ("harmonic balance", solution.deflection, floquet.multipliers, floquet.stable),
+            ("Hill's method", solution.deflection, hill.multipliers, hill.stable),
             ("shooting", shot.solution.deflection, shot.multipliers, shot.stable),
         ):
             if route != "Hill's method":
@@ -219,10 +219,10 @@ def dead_zone() -> tuple[Row, ...]:
     rows = []
     problem = oscillator(PiecewiseSprings([0], [-1.0, 1.0], [1.0, 0.0, 1.0]))
     for amplitude, period in ((2.0, "10.283185307"), (1.5, "14.283185307"), (5.0, "7.283185307")):
-        found = solve_free_vibration(problem, ([amplitude], [0.0]), 0.9 * float(period), harmonics=1)
+        vibration = solve_free_vibration(problem, ([amplitude], [0.0]), 0.9 * float(period), harmonics=1)
         quantity = f"backlash b = 1, A = {amplitude:g}: period by shooting"
-        rows.append(printed("H4", "2 pi + 4 b / (A - b)", quantity, period, found.period))
-        error = abs(np.linalg.det(found.monodromy) - 1.0)
+        rows.append(printed("H4", "2 pi + 4 b / (A - b)", quantity, period, vibration.period))
+        error = abs(np.linalg.det(vibration.monodromy) - 1.0)
         quantity = f"backlash b = 1, A = {amplitude:g}: determinant of the monodromy less one"
         rows.append(at_most("H4", "no damping", quantity, 1e-9, error))
     return tuple(rows)
@@ -244,9 +244,9 @@ def stops() -> tuple[Row, ...]:
     problem, name = two_masses(), "two masses with stops:"
     ends = 2.0 * np.pi * np.array([40.0, 250.0])
     branch = frequency_response_curve(problem, ends, harmonics=25, options=StepOptions(largest=0.2))
-    one, other = branch.branch_points
+    first_point, other = branch.branch_points
     top, bottom = branch.folds
-    legs = np.split(branch.stable, [one, other, top, bottom])
+    legs = np.split(branch.stable, [first_point, other, top, bottom])
     # next to the borders the largest multiplier is one to rounding
     wrong = sum(int(np.sum(leg[2:-2] != stable)) for leg, stable in zip(legs, (True, False) * 3))
     rows = [
@@ -254,15 +254,15 @@ def stops() -> tuple[Row, ...]:
         counted("H4", "theory", f"{name} verdicts that do not change at branch points and folds", 0, wrong),
     ]
     for hertz, part in (
-        (105.0, np.arange(one)),
+        (105.0, np.arange(first_point)),
         (200.0, np.arange(other, top)),
         (200.0, np.arange(bottom, len(branch.parameter))),
     ):
         i = part[np.argmin(np.abs(branch.parameter[part] - 2.0 * np.pi * hertz))]
-        settled, found = settled_line(problem, branch.solutions[i]), branch.lines[i][0, 1]
+        settled, line = settled_line(problem, branch.solutions[i]), branch.lines[i][0, 1]
         side = "up to the loss of symmetry" if part[0] == 0 else "upper" if part[-1] < bottom else "lower"
         quantity = f"{name} {side}, {branch.parameter[i] / 2 / np.pi:.2f} Hz: error of the first harmonic"
-        error = abs(found - settled) / abs(settled)
+        error = abs(line - settled) / abs(settled)
         rows.append(at_most("H4", "integration in time by SciPy's DOP853", quantity, 1e-5, error))
     return tuple(rows)
 
@@ -302,8 +302,8 @@ def truss() -> tuple[Row, ...]:
         return np.array([force - load]), np.array([[slope]]), np.array([-1.0])
 
     curve = continue_curve(balance, [0.0], 0.0, limits=(-1e-3, 1e-3), scale=0.1)
-    one, two = curve.folds
-    place, load = curve.points[one, 0], curve.parameter[one]
+    first_fold, two = curve.folds
+    place, load = curve.points[first_fold, 0], curve.parameter[first_fold]
     source, name = "h - sqrt(L^(2/3) - 1), L the length at rest", "von Mises truss:"
     return (
         printed("H5", CLOSED, f"{name} limit load", "3.81087190e-4", load),
@@ -326,14 +326,14 @@ def manufactured() -> tuple[Row, ...]:
     piecewise = manufactured_errors(springs, corners, omega, (24, 48, 96, 192))
     rows = []
     decay = np.log((3.0 + np.sqrt(5.0)) / 2.0)
-    for low, high, one, two in zip((8, 16), (16, 32), smooth, smooth[1:]):
+    for low, high, error, two in zip((8, 16), (16, 32), smooth, smooth[1:]):
         quantity = f"smooth law: decay of the error a harmonic, {low} to {high} harmonics"
         source = "lines of 1 / (1.5 - cos) fall by 0.381966 a harmonic"
-        rows.append(within("H6", source, quantity, decay, np.log(one / two) / (high - low), 0.05))
-    for low, one, two in zip((24, 48, 96), piecewise, piecewise[1:]):
+        rows.append(within("H6", source, quantity, decay, np.log(error / two) / (high - low), 0.05))
+    for low, error, two in zip((24, 48, 96), piecewise, piecewise[1:]):
         quantity = f"piecewise law: order of the error, {low} to {2 * low} harmonics"
         source = "lines fall with the fourth power, their sum with the third"
-        rows.append(within("H6", source, quantity, 3.0, np.log2(one / two), 0.2, relative=False))
+        rows.append(within("H6", source, quantity, 3.0, np.log2(error / two), 0.2, relative=False))
     return tuple(rows)
 
 
@@ -352,6 +352,6 @@ def manufactured_errors(law, motion: np.ndarray, omega: float, counts) -> list[f
         forces = [(load[h], (h,)) for h in range(1, count + 1)]
         problem = oscillator(law, damping=0.1, load=load[0].real, forces=forces)
         start = lines[None, : count + 1]
-        found = solve_harmonic_balance(problem, omega, harmonics=count, start=start, samples=samples)
-        errors.append(float(np.abs(found.at(tau / omega)[:, 0] - motion).max()))
+        solution = solve_harmonic_balance(problem, omega, harmonics=count, start=start, samples=samples)
+        errors.append(float(np.abs(solution.at(tau / omega)[:, 0] - motion).max()))
     return errors

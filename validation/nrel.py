@@ -72,9 +72,9 @@ def frequencies() -> tuple[Row, ...]:
     rows = []
     expected, moved = _springs_b(independent.wind_turbine_b()), independent.moved_by_digits(_springs_b)
     for printed, words in ((False, "shipped reading"), (True, "as printed")):
-        found = _by_kind(wind_turbine_b(as_printed=printed))
+        frequencies = _by_kind(wind_turbine_b(as_printed=printed))
         for k, (kind, number, paper) in enumerate(FREQUENCIES_B):
-            name, value = f"set B, {words}: {kind} mode {number + 1} [Hz]", found[kind][number]
+            name, value = f"set B, {words}: {kind} mode {number + 1} [Hz]", frequencies[kind][number]
             if printed:
                 rows.append(information("PG-B", PAPER, name, paper, value))
                 continue
@@ -87,9 +87,9 @@ def frequencies() -> tuple[Row, ...]:
                 rows.append(information("PG-B", PAPER, name, paper, value, note=note))
             rows.append(within("PG-B", independent.SOURCE, name, expected[k], value, 1e-9))
     for reduced, words in ((True, "I / r^2"), (False, "polar inertias")):
-        found = _by_kind(wind_turbine_a(reduced_inertia=reduced))
+        frequencies = _by_kind(wind_turbine_a(reduced_inertia=reduced))
         for kind, paper in FREQUENCIES_A:
-            value = found[kind][np.argmin(np.abs(found[kind] - paper))]
+            value = frequencies[kind][np.argmin(np.abs(frequencies[kind] - paper))]
             name = f"set A, {words}: nearest {kind} mode [Hz]"
             rows.append(information("PG-A", PAPER, name, paper, value, note="no reading reaches it"))
     return tuple(rows)
@@ -97,8 +97,8 @@ def frequencies() -> tuple[Row, ...]:
 
 def _springs_b(net) -> np.ndarray:
     """Frequencies [Hz] of `FREQUENCIES_B`: two pairs and two single ones, ascending but for their kinds."""
-    first, _, one, second, _, two = net.frequencies(independent.PLANAR)[:6]
-    return np.array([first, one, second, two])
+    first, _, rotational, second, _, two = net.frequencies(independent.PLANAR)[:6]
+    return np.array([first, rotational, second, two])
 
 
 def _by_kind(data) -> dict[str, np.ndarray]:
@@ -157,7 +157,7 @@ def small_plays() -> tuple[Row, ...]:
         if not branch.complete:
             raise ConvergenceError(f"no whole branch: {branch.message}", code="E-CONVERGENCE")
         folds = branch.parameter[branch.folds] / (2.0 * math.pi)
-        closed = min(float(contact_shares(problem, one)[:6].min()) for one in branch.solutions)
+        closed = min(float(contact_shares(problem, solution)[:6].min()) for solution in branch.solutions)
         name = f"set B, play {play * 1e6:.0f} um, torque against the turning:"
         rows += [
             information("PG-B", PAPER, f"{name} resonance shifted to, upper fold [Hz]", 84.0, folds.max()),
@@ -179,7 +179,7 @@ def sun_support() -> tuple[Row, ...]:
     for support in (data.sun.support, 1e8, 1e9):
         held = replace(data, sun=replace(data.sun, support=support))
         problem = bearing_problem_a(200e-6, backlash=150e-6, data=held)
-        found = solve_harmonic_balance(
+        solution = solve_harmonic_balance(
             problem,
             2.0 * math.pi * 0.37,
             harmonics=20,
@@ -187,7 +187,7 @@ def sun_support() -> tuple[Row, ...]:
             reduction=drive_reduction(problem),
             stability=False,
         )
-        back = float(contact_shares(problem, found)[6:12].max()) if found.converged else math.nan
+        back = float(contact_shares(problem, solution)[6:12].max()) if solution.converged else math.nan
         name = f"set A, play 150 um, clearance 200 um, sun support {support:.0e} N/m: share of the cycle"
         note = "Fig. 11 says that a stiffer support raises wedging"
         rows.append(information("PG-A", PAPER, f"{name} with back flanks in contact", None, back, note=note))
@@ -212,14 +212,14 @@ def ring_resonance() -> tuple[Row, ...]:
 def wedging() -> tuple[Row, ...]:
     """Set A: where back flanks begin to touch, over the clearance of the carrier bearing."""
     backlash, ratios = 150e-6, np.arange(1.10, 1.36, 0.01)
-    found = wedging_map((0.37, 2.0, 5.0, 10.0), ratios * backlash, backlash=backlash)
-    onset = wedging_onset(found) / backlash
+    shares = wedging_map((0.37, 2.0, 5.0, 10.0), ratios * backlash, backlash=backlash)
+    onset = wedging_onset(shares) / backlash
     reference, source = 0.5 / math.sin(wind_turbine_a().pressure_angle_sun_planet), "1 / (2 sin alpha), rigid"
     name = "set A, clearance over play where back flanks begin to touch"
     note = "the loaded teeth give way and leave more play"
     rows = [
         information("PG-A", source, f"{name}, weight at {hertz:g} Hz", reference, value, note=note)
-        for hertz, value in zip(found.frequency, onset)
+        for hertz, value in zip(shares.frequency, onset)
     ]
     rows.append(at_most("PG-A", source, f"{name}: spread over frequency", 0.02, float(np.ptp(onset))))
     left, closed = play_left(backlash, backlash)
@@ -236,7 +236,7 @@ def play_left(clearance: float, backlash: float, *, frequency: float = 0.37) -> 
     drive flanks opens the back ones by ``F / k_rp``.
     """
     problem, data = bearing_problem_a(clearance, backlash=backlash), wind_turbine_a()
-    found = solve_harmonic_balance(
+    solution = solve_harmonic_balance(
         problem,
         2.0 * math.pi * frequency,
         harmonics=7,
@@ -244,7 +244,7 @@ def play_left(clearance: float, backlash: float, *, frequency: float = 0.37) -> 
         reduction=drive_reduction(problem),
         stability=False,
     )
-    x = found.at(np.linspace(0.0, 1.0 / frequency, 721))
+    x = solution.at(np.linspace(0.0, 1.0 / frequency, 721))
     apart, angle = np.hypot(x[:, -2], x[:, -1]).max(), data.pressure_angle_planet_ring
     force = TORQUE_A / (3.0 * data.centre_distance * 2.0 * math.cos(angle))
     closed = backlash + force / data.stiffness_planet_ring[0] - 2.0 * apart * math.sin(angle)
@@ -273,16 +273,16 @@ def extended_errors(lines=((3, 3, 3), (3, 8, 3)), *, speed: float = 30.0, steps:
     frequency = 2.0 * math.pi * turns * np.array([1.0, TEETH_B[1]])
     times = np.append(0.0, np.linspace(1.0, 2.0, TEETH_B[1] * 32, endpoint=False) / turns)
     solutions, reduction = [], drive_reduction(problem)
-    for one in lines:
-        found = solve_harmonic_balance(
-            problem, frequency, orders=side_bands(*one), reduction=reduction, stability=False
+    for counts in lines:
+        solution = solve_harmonic_balance(
+            problem, frequency, orders=side_bands(*counts), reduction=reduction, stability=False
         )
-        solutions.append(found)
+        solutions.append(solution)
     moved = solve_transient(problem, frequency, times, method="modal", step=1.0 / (turns * TEETH_B[1] * steps))
     force, errors = moved.force[1:], []
-    for one in solutions:
-        wave = np.exp(1j * times[1:, None] * one.line_frequency)
-        errors.append(np.sqrt(((force - (wave @ one.force.T).real) ** 2).mean(axis=0)).max())
+    for counts in solutions:
+        wave = np.exp(1j * times[1:, None] * counts.line_frequency)
+        errors.append(np.sqrt(((force - (wave @ counts.force.T).real) ** 2).mean(axis=0)).max())
     return [float(error / force.std(axis=0).max()) for error in errors]
 
 

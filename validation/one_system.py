@@ -47,22 +47,22 @@ def small_sets() -> tuple[Row, ...]:
             drive, structure = excitation(paths, sense), feet(4)
             modes = rigid_modes(paths, drive)
             for coupled in (4, 2):
-                known = {"harmonics": (2, 4), "coupled_diameters": coupled, "tolerance": 1e-13}
-                found = solve_two_way(modes, drive, structure, paths, sense * speeds, **known)
+                options = {"harmonics": (2, 4), "coupled_diameters": coupled, "tolerance": 1e-13}
+                response = solve_two_way(modes, drive, structure, paths, sense * speeds, **options)
                 apart = 0.0
                 for i, speed in enumerate(sense * speeds):
                     direct = direct_forces(
                         modes, drive, structure, paths, float(speed), harmonics=(2, 4), coupled=coupled
                     )
-                    apart = max(apart, farthest_apart(found, i, *direct))
+                    apart = max(apart, farthest_apart(response, i, *direct))
                 unknown = "one planet for all" if symmetry > 1 else "every planet"
                 rows.append(_row(f"four feet, {words}, {unknown}, n up to {coupled} of 4 coupled", apart))
     paths = MeshPaths(97, EQUAL, 0.1, 1)
     drive, structure = shaken(paths, 3), feet(3)
     modes = rigid_modes(paths, drive)
-    found = solve_two_way(modes, drive, structure, paths, [40.0], harmonics=(2, 3), tolerance=1e-13)
+    response = solve_two_way(modes, drive, structure, paths, [40.0], harmonics=(2, 3), tolerance=1e-13)
     direct = direct_forces(modes, drive, structure, paths, 40.0, harmonics=(2, 3), coupled=3)
-    rows.append(_row("four feet, errors that turn over three mesh periods", farthest_apart(found, 0, *direct)))
+    rows.append(_row("four feet, errors that turn over three mesh periods", farthest_apart(response, 0, *direct)))
     return (*rows, *_damped())
 
 
@@ -75,11 +75,11 @@ def _damped() -> tuple[Row, ...]:
         mean = drive.stiffness.mean(axis=1)
         matrix = modal_damping(joined(paths, ring, 2), mean, 0.04)
         modes = undamped_modes(gears(EQUAL), mean, damping_ratio=0.04)
-        known = {"harmonics": (2, 6), "tolerance": 1e-13}
-        found = solve_two_way(modes, drive, structure, paths, [20.0 * sense], damping=matrix, **known)
+        options = {"harmonics": (2, 6), "tolerance": 1e-13}
+        response = solve_two_way(modes, drive, structure, paths, [20.0 * sense], damping=matrix, **options)
         direct = direct_damped_forces(modes, drive, structure, paths, 20.0 * sense, matrix, harmonics=(2, 6))
         words = f"four feet, damping of gears and ring as a whole, {'forwards' if sense > 0 else 'backwards'}"
-        rows.append(_row(words, farthest_apart(found, 0, *direct)))
+        rows.append(_row(words, farthest_apart(response, 0, *direct)))
     return tuple(rows)
 
 
@@ -114,7 +114,7 @@ def _apart(entries, rpm: float, harmonics: tuple[int, int]) -> float:
     ratio = case.dynamics.damping_ratio
     gears_alone = replace(there.gears, damping_ratio=np.full_like(there.gears.damping_ratio, ratio))
     set_in = gears_alone, there.excitation, there.structure, there.paths
-    known = {"harmonics": harmonics, "coupled_diameters": there.coupled, "tolerance": 1e-12}
-    found = solve_two_way(*set_in, [_CARRIER * rpm], **known)
+    options = {"harmonics": harmonics, "coupled_diameters": there.coupled, "tolerance": 1e-12}
+    response = solve_two_way(*set_in, [_CARRIER * rpm], **options)
     direct = direct_forces(*set_in, _CARRIER * rpm, harmonics=harmonics, coupled=there.coupled)
-    return farthest_apart(found, 0, *direct)
+    return farthest_apart(response, 0, *direct)

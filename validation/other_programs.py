@@ -109,14 +109,14 @@ def last_period(model: DynamicModel, speed: float, harmonics: int, names: list[s
     with TemporaryDirectory() as folder:
         path = Path(folder, "train.fmu")
         write_fmu(model, path, harmonics=harmonics)
-        known = {"output_interval": step, "step_size": step, "start_values": {"speed": speed}, "output": names}
-        return fmpy.simulate_fmu(str(path), stop_time=periods / hertz, **known)[-INSTANTS - 1 : -1]
+        options = {"output_interval": step, "step_size": step, "start_values": {"speed": speed}, "output": names}
+        return fmpy.simulate_fmu(str(path), stop_time=periods / hertz, **options)[-INSTANTS - 1 : -1]
 
 
-def _apart(found: np.ndarray, lines: np.ndarray) -> float:
+def _apart(computed: np.ndarray, lines: np.ndarray) -> float:
     """Largest difference from lines (H + 1,) over the largest value of the period."""
     expected = sample(lines, 8 * INSTANTS)[::8]
-    return float(np.abs(found - expected).max() / np.abs(expected).max())
+    return float(np.abs(computed - expected).max() / np.abs(expected).max())
 
 
 def pairs() -> tuple[Row, ...]:
@@ -127,18 +127,18 @@ def pairs() -> tuple[Row, ...]:
     motion, rows = solve(case, "dynamics")["dynamics"].motion, list[Row]()
     names = _OF_PAIR
     for number, speed in enumerate(case.operation.speeds):
-        found = last_period(model, speed, 6, names)
+        period = last_period(model, speed, 6, names)
         parted = motion.lowest[number] <= 0.0
         lines = [motion.deflection[number, 0]]
         if not parted:
             hertz = [model.mesh_rate * speed]
-            known = {"excitation_harmonics": 6, "response_harmonics": RESPONSE, "tolerance": 1e-12}
-            response = solve_spectral(modes.modes, modes.excitation, hertz, **known)
+            options = {"excitation_harmonics": 6, "response_harmonics": RESPONSE, "tolerance": 1e-12}
+            response = solve_spectral(modes.modes, modes.excitation, hertz, **options)
             lines = [response.deflection[0, 0], response.force[0, 0]]
         which = f"pair at {speed * 30 / np.pi:.0f} rpm, flanks {'part' if parted else 'in contact'}"
         for word, name, line in zip(("deflection", "force"), names, lines, strict=False):
             text = f"{word} of the mesh by the FMU, largest difference [1]"
-            rows.append(at_most(which, BALANCE if parted else SPECTRAL, text, GATE, _apart(found[name], line)))
+            rows.append(at_most(which, BALANCE if parted else SPECTRAL, text, GATE, _apart(period[name], line)))
     return tuple(rows)
 
 
@@ -148,12 +148,12 @@ def rubbing() -> tuple[Row, ...]:
         return _MISSING
     acts = {"losses": {"friction": "constant", "coefficient": 0.06, "excites": True}, "dynamics.damping_ratio": 0.05}
     _, modes, model = _case("spur_pair", _PAIR | acts | {"operation.speeds": ["2865 rpm"]})
-    known = {"excitation_harmonics": 6, "response_harmonics": RESPONSE, "tolerance": 1e-12}
-    response = solve_spectral(modes.modes, modes.excitation, [model.mesh_rate * model.speed], **known)
-    found, rows = last_period(model, model.speed, 6, _OF_PAIR), list[Row]()
+    options = {"excitation_harmonics": 6, "response_harmonics": RESPONSE, "tolerance": 1e-12}
+    response = solve_spectral(modes.modes, modes.excitation, [model.mesh_rate * model.speed], **options)
+    period, rows = last_period(model, model.speed, 6, _OF_PAIR), list[Row]()
     for word, name in zip(("deflection", "force"), _OF_PAIR, strict=True):
         text = f"{word} of the mesh by the FMU, largest difference [1]"
-        apart = _apart(found[name], getattr(response, word)[0, 0])
+        apart = _apart(period[name], getattr(response, word)[0, 0])
         rows.append(at_most("pair with friction, mu 0.06, at 2865 rpm", SPECTRAL, text, GATE, apart))
     return tuple(rows)
 
@@ -163,33 +163,33 @@ def sets() -> tuple[Row, ...]:
     if not _installed():
         return _MISSING
     rows = list[Row]()
-    known = {"response_harmonics": RESPONSE, "tolerance": 1e-12}
+    options = {"response_harmonics": RESPONSE, "tolerance": 1e-12}
     _, modes, model = _case("helical_30_20_70", _HELICAL)
     names = [f"{word}_of_planet_2_ring_slice_3" for word in ("deflection", "force")]
     place = [*model.modal.meshes].index("planet 2-ring, slice 3")
-    found = last_period(model, model.speed, 6, names)
+    period = last_period(model, model.speed, 6, names)
     hertz = [model.mesh_rate * model.speed]
-    response = solve_spectral(modes.modes, modes.excitation, hertz, excitation_harmonics=6, **known)
+    response = solve_spectral(modes.modes, modes.excitation, hertz, excitation_harmonics=6, **options)
     for word, name in zip(("deflection", "force"), names, strict=True):
         text = f"{word} of a slice by the FMU, largest difference [1]"
         line = getattr(response, word)[0, place]
-        rows.append(at_most("30/20/70, five slices", SPECTRAL, text, GATE, _apart(found[name], line)))
+        rows.append(at_most("30/20/70, five slices", SPECTRAL, text, GATE, _apart(period[name], line)))
     case, modes, model = _case("planetary_27_40_108", _SET)
     names = ["deflection_of_sun_planet_1", "force_of_planet_1_ring", "transmission_error_of_sun_planet_1", "sensor"]
-    found = last_period(model, model.speed, 10, names)
+    period = last_period(model, model.speed, 10, names)
     hertz = [model.mesh_rate * model.speed]
-    response = solve_spectral(modes.modes, modes.excitation, hertz, excitation_harmonics=10, **known)
+    response = solve_spectral(modes.modes, modes.excitation, hertz, excitation_harmonics=10, **options)
     error, field = mesh_and_ring_outputs(modes, response)
     lines = (response.deflection[0, 0], response.force[0, 3], error[0, 0])
     words = ("deflection of a mesh", "force of a mesh", "dynamic transmission error")
     for name, line, word in zip(names, lines, words, strict=False):
         text = f"{word} by the FMU, largest difference [1]"
-        rows.append(at_most("27/40/108", SPECTRAL, text, GATE, _apart(found[name], line)))
+        rows.append(at_most("27/40/108", SPECTRAL, text, GATE, _apart(period[name], line)))
     assert model.sensor is not None
-    heard = lines_of_field(case, modes, field, np.array([model.speed * model.sensor.carrier]))
-    turning = np.outer(found["time"], heard.order * heard.base_speed[0])
-    expected = np.real(np.exp(1j * turning) @ heard.displacement[0])
-    apart = float(np.abs(found["sensor"] - expected).max() / np.abs(expected).max())
+    sensor_lines = lines_of_field(case, modes, field, np.array([model.speed * model.sensor.carrier]))
+    turning = np.outer(period["time"], sensor_lines.order * sensor_lines.base_speed[0])
+    expected = np.real(np.exp(1j * turning) @ sensor_lines.displacement[0])
+    apart = float(np.abs(period["sensor"] - expected).max() / np.abs(expected).max())
     text = "displacement at the sensor by the FMU, largest difference [1]"
     rows.append(at_most("27/40/108", "Lines of the fixed sensor.", text, GATE, apart))
     return tuple(rows)
@@ -200,9 +200,9 @@ def gearboxes() -> tuple[Row, ...]:
     if not _installed():
         return _MISSING
     case = read_case(_TWO_STAGES)
-    found, model = solve(case, "deflection")["deflection"].of(case).state, dynamic_model(case)
-    known = {"separates": False, "back_flanks": False, "gyroscopic": False, "turning": False}
-    box = nonlinear_gearbox(found, all_excitations(found), harmonics=3, **known)
+    state, model = solve(case, "deflection")["deflection"].of(case).state, dynamic_model(case)
+    options = {"separates": False, "back_flanks": False, "gyroscopic": False, "turning": False}
+    box = nonlinear_gearbox(state, all_excitations(state), harmonics=3, **options)
     lines = [line for line in product(range(-_ORDERS, _ORDERS + 1), repeat=2) if line >= (0, 0)]
     orders = np.array([line for line in lines if abs(line[0]) + abs(line[1]) <= _ORDERS])
     orders = orders[np.argsort(orders.any(axis=1), kind="stable")]
@@ -235,9 +235,9 @@ def matrices() -> tuple[Row, ...]:
     for s, h in np.ndindex(len(hertz), 4):
         states = 2j * np.pi * hertz[s] * (h + 1) * np.eye(len(space.A)) - space.A
         moved = np.linalg.solve(states, space.B[:, :M] @ displacement[s, :, h + 1])
-        found = (space.C @ moved + space.D[:, :M] @ displacement[s, :, h + 1])[: 2 * M]
+        outputs = (space.C @ moved + space.D[:, :M] @ displacement[s, :, h + 1])[: 2 * M]
         for part, lines in enumerate((response.deflection, response.force)):
-            apart = np.abs(found[part * M : (part + 1) * M] - lines[s, :, h + 1]).max() / np.abs(lines[s]).max()
+            apart = np.abs(outputs[part * M : (part + 1) * M] - lines[s, :, h + 1]).max() / np.abs(lines[s]).max()
             worst[part] = max(worst[part], float(apart))
     for word, value in zip(("deflections", "forces"), worst, strict=True):
         text = f"{word} of all meshes by A, B, C, D, four harmonics, largest difference [1]"

@@ -99,9 +99,9 @@ def page(rows: Sequence[Mapping[str, str]], introductions: Mapping[str, str], *,
             parts += [_group(*key, group) for key, group in groups.items()]
     parts.append("## Themes\n")
     for title, text in introductions.items():
-        own = [row for row in rows if row["theme"] == title]
+        of_theme = [row for row in rows if row["theme"] == title]
         parts.append(f"### {title}\n")
-        parts.append(f"{text} {len(own)} rows: {_tally(own)}.".lstrip() + "\n")
+        parts.append(f"{text} {len(of_theme)} rows: {_tally(of_theme)}.".lstrip() + "\n")
     return "\n".join([*parts, ALL_ROWS])
 
 

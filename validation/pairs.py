@@ -165,14 +165,14 @@ def iso_stiffness() -> tuple[Row, ...]:
 
 def over_hertz(pair: GearPair, cycle, overlap: float, base: float) -> np.ndarray:
     """Pressures of slices over those of Hertz between cylinders in the normal section."""
-    one, two = pair.gear_1, pair.gear_2
-    ahead = overlap * ((np.arange(SLICES) + 0.5) / SLICES - 0.5) * one.pitch_angle * one.base_radius
+    pinion, two = pair.gear_1, pair.gear_2
+    ahead = overlap * ((np.arange(SLICES) + 0.5) / SLICES - 0.5) * pinion.pitch_angle * pinion.base_radius
     path, tangent = cycle.path[:, :, None] + ahead[:, None], np.tan(pair.working_pressure_angle)
     sign = -1.0 if two.internal else 1.0
-    curved = 1 / (one.base_radius * tangent + path) + sign / (two.base_radius * tangent - sign * path)
+    curved = 1 / (pinion.base_radius * tangent + path) + sign / (two.base_radius * tangent - sign * path)
     carries = (cycle.slice_pressure > 0) & (cycle.slice_load > 0.2 * cycle.slice_load.max())
     modulus = STEEL.youngs_modulus / (2.0 * (1.0 - STEEL.poisson_ratio**2))
-    hertz = np.sqrt(cycle.slice_load * modulus * curved * np.cos(base) / (np.pi * one.face_width))
+    hertz = np.sqrt(cycle.slice_load * modulus * curved * np.cos(base) / (np.pi * pinion.face_width))
     return cycle.slice_pressure[carries] / hertz[carries]
 
 
@@ -198,7 +198,7 @@ def whole_gear(gear: Gear, fine: tuple[int, ...], flank_elements: int):
     cut = len(np.unique(coarse.boundaries["cut_left"]))
     assert len(kept) == first - gear.teeth * cut, "the cuts of the sectors do not match"
     merged = merged.ravel()
-    edges = {"rim": merged[np.concatenate(rim)], **{str(n): merged[one] for n, one in flanks.items()}}
+    edges = {"rim": merged[np.concatenate(rim)], **{str(n): merged[nodes] for n, nodes in flanks.items()}}
     grid = Grid(whole[kept], merged[np.concatenate(triangles)], edges, {})
     free = np.setdiff1d(np.arange(2 * grid.n_nodes), node_dofs(np.unique(edges["rim"])))
     K = stiffness(grid, STEEL, thickness=1.0)[free][:, free]
@@ -208,8 +208,8 @@ def whole_gear(gear: Gear, fine: tuple[int, ...], flank_elements: int):
 def near_edges(slave: Surface, master: Surface, reach: float) -> tuple[int, int] | None:
     """First and last edge of the slave with a counterpart within a reach [m]; None without."""
     away = master.points[None] - slave.points[0::2, None]
-    found = covered(slave, master) & (np.hypot(*away.transpose(2, 0, 1)).min(axis=1) < reach)
-    near = np.flatnonzero(found[1:] & found[:-1])
+    touching = covered(slave, master) & (np.hypot(*away.transpose(2, 0, 1)).min(axis=1) < reach)
+    near = np.flatnonzero(touching[1:] & touching[:-1])
     return (int(near[0]), int(near[-1])) if len(near) else None
 
 
@@ -218,9 +218,9 @@ def two_bodies(flank_elements: int) -> np.ndarray:
     pair, pairs = pair_of(*TEETH[1]), (-1, 0)
     bodies = [whole_gear(g, (-1, 0, 1), flank_elements) for g in pair.gears]
     factors = [symmetric_factor(body[3]) for body in bodies]
-    found = np.zeros((len(POSITIONS), 3))
+    values = np.zeros((len(POSITIONS), 3))
     for p, tau in enumerate(POSITIONS):
-        angles = [one[0] for one in orientations(pair, tau).gears]
+        angles = [gear_angle[0] for gear_angle in orientations(pair, tau).gears]
 
         def surface(body, tooth, angle, centre):
             grid, flanks, free, K = body
@@ -238,8 +238,8 @@ def two_bodies(flank_elements: int) -> np.ndarray:
         solved = mortar_contacts(
             places, loads, centre=pair.centre_distance, base_radius=pair.gear_2.base_radius, factors=factors
         )
-        found[p] = [approach for approach, _ in solved]
-    return found
+        values[p] = [approach for approach, _ in solved]
+    return values
 
 
 def whole_bodies() -> tuple[Row, ...]:

@@ -32,8 +32,8 @@ def mathieu_monodromy(a: float, q: float, damping: float = 0.0, steps: int = 200
         matrix[:, 0, 1], matrix[:, 1, 1] = 1.0, -damping
         matrix[:, 1, 0] = -(a - 2 * q * np.cos(2 * (middle + side * h * math.sqrt(3) / 6)))
         gauss.append(matrix)
-    one, two = gauss
-    effective = 0.5 * (one + two) - math.sqrt(3) / 12 * h * (one @ two - two @ one)
+    first_point, two = gauss
+    effective = 0.5 * (first_point + two) - math.sqrt(3) / 12 * h * (first_point @ two - two @ first_point)
     return monodromy(effective, np.full(steps, h))
 
 
@@ -121,14 +121,14 @@ def rectangular_stiffness() -> tuple[Row, ...]:
 def one_pair(damping_ratio: float) -> tuple[Modes, MeshExcitation]:
     """Modal basis and excitation of the gear pair of G5 and G6, unit mass, sampled mesh stiffness."""
     stiffness = np.where(np.arange(2000) < RATIO * 2000, 1.0, SOFT)[None]
-    one = np.ones((1, 1))
+    unit = np.ones((1, 1))
     modes = Modes(
         frequency=np.array([NATURAL / (2 * math.pi)]),
         damping_ratio=np.array([damping_ratio]),
-        shape=one,
+        shape=unit,
         mesh_stiffness=np.array([MEAN]),
-        mesh_deflection=one,
-        residual=0 * one,
+        mesh_deflection=unit,
+        residual=0 * unit,
         load_deflection=np.array([1 / MEAN]),
         kind=("elastic",),
         nodal_diameter=np.array([-1]),

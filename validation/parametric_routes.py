@@ -56,15 +56,15 @@ def mathieu_boundaries() -> tuple[Row, ...]:
     ):
         between = q * (1.0 - share), q * (1.0 + share)
         wave = FourierSeries([[a, -2.0]])
-        found = stability_boundary(oscillator(), wave, between, frequency=2.0)
+        border = stability_boundary(oscillator(), wave, between, frequency=2.0)
         quantity = f"Mathieu, a = {name}({q:g}): q at the boundary of stability"
-        rows.append(within("G1", "scipy.special.mathieu_a, mathieu_b", quantity, q, found, 1e-9))
+        rows.append(within("G1", "scipy.special.mathieu_a, mathieu_b", quantity, q, border, 1e-9))
     for damping, q in ((0.1, "0.1000546711"), (0.2, "0.2004369763")):
         wave = FourierSeries([[1.0, -2.0]])
-        found = stability_boundary(oscillator(damping=damping), wave, (0.02, 0.4), frequency=2.0)
+        border = stability_boundary(oscillator(damping=damping), wave, (0.02, 0.4), frequency=2.0)
         quantity = f"damped Mathieu a = 1, c = {damping}: threshold q"
         source = f"threshold by DOP853 ({REPEATED})"
-        rows.append(printed("G3", source, quantity, q, found))
+        rows.append(printed("G3", source, quantity, q, border))
     return tuple(rows)
 
 
@@ -72,22 +72,22 @@ def mathieu_verdicts() -> tuple[Row, ...]:
     """G2: verdicts on Mathieu's equation by splitting and by Hill's method."""
     rows = []
     for judge in (partial(floquet_verdict, tolerance=1e-11), hill_verdict):
-        found = verdict_at(loaded(FourierSeries([[1.0, -2.0]])), 2.0, judge)
-        name, source = f"({found.method})", f"independent integration, DOP853 ({REPEATED})"
-        low, high = np.sort(found.multipliers.real)
+        verdict = verdict_at(loaded(FourierSeries([[1.0, -2.0]])), 2.0, judge)
+        name, source = f"({verdict.method})", f"independent integration, DOP853 ({REPEATED})"
+        low, high = np.sort(verdict.multipliers.real)
         rows += [
             printed("G2", source, f"Mathieu a = 1, q = 1: larger multiplier {name}", "-4.15605494", low),
             printed("G2", source, f"Mathieu a = 1, q = 1: smaller multiplier {name}", "-.2406128", high),
-            counted("G2", "theory", f"Mathieu a = 1, q = 1: loss through -1 {name}", 1, found.loss == "flip"),
+            counted("G2", "theory", f"Mathieu a = 1, q = 1: loss through -1 {name}", 1, verdict.loss == "flip"),
         ]
-        found = verdict_at(loaded(FourierSeries([[2.5, -2.0]])), 2.0, judge)
-        largest = abs(found.multipliers[0])
+        verdict = verdict_at(loaded(FourierSeries([[2.5, -2.0]])), 2.0, judge)
+        largest = abs(verdict.multipliers[0])
         rows.append(within("G2", "theory", f"Mathieu a = 2.5, q = 1: modulus {name}", 1.0, largest, 1e-9))
         for damping in (0.1, 0.3):
             problem = loaded(FourierSeries([[1.0, -2.0]]), damping=damping)
-            found = verdict_at(problem, 2.0, judge)
+            verdict = verdict_at(problem, 2.0, judge)
             quantity = f"Mathieu a = 1, q = 1, c = {damping}: product of the multipliers {name}"
-            product = np.prod(found.multipliers).real
+            product = np.prod(verdict.multipliers).real
             rows.append(within("G2", "exp(-c T)", quantity, math.exp(-damping * math.pi), product, 1e-10))
     return tuple(rows)
 
@@ -98,14 +98,14 @@ def meissner_verdicts() -> tuple[Row, ...]:
     closed = "2 cos A cos B - (w1/w2 + w2/w1) sin A sin B"
     for d, e, value in ((0.25, 0.1, "-2.15946099"), (1.0, 0.3, "2.01491540"), (0.5, 0.2, "-.79900962")):
         steps = StepSeries([[d + e, d - e]], [0.0, 0.5])
-        found = floquet_verdict(loaded(steps, load=0.0), rest(1.0))
-        quantity = f"Meissner d = {d}, e = {e}: sum of the multipliers ({found.method})"
-        rows.append(printed("G4", closed, quantity, value, np.sum(found.multipliers).real))
+        verdict = floquet_verdict(loaded(steps, load=0.0), rest(1.0))
+        quantity = f"Meissner d = {d}, e = {e}: sum of the multipliers ({verdict.method})"
+        rows.append(printed("G4", closed, quantity, value, np.sum(verdict.multipliers).real))
     for d, between in ((0.3678177281, (0.1, 0.3)), (0.9900288140, (0.1, 0.3)), (1.0290305698, (0.1, 0.3))):
         # depth 1 of these steps is e = 1
         steps = StepSeries([[d + 1.0, d - 1.0]], [0.0, 0.5])
-        found = stability_boundary(oscillator(), steps, between, frequency=1.0)
-        rows.append(within("G4", closed, f"Meissner d = {d}: e at the boundary", 0.2, found, 1e-8))
+        verdict = stability_boundary(oscillator(), steps, between, frequency=1.0)
+        rows.append(within("G4", closed, f"Meissner d = {d}: e at the boundary", 0.2, verdict, 1e-8))
     return tuple(rows)
 
 
@@ -120,9 +120,9 @@ def rectangular_bands() -> tuple[Row, ...]:
     ):
         for edge, side in ((low, -0.004), (high, 0.004)):
             between = (float(edge) + side) * NATURAL, inside * NATURAL
-            found = stability_boundary(oscillator(), RECTANGLE, between, depth=1.0) / NATURAL
+            border = stability_boundary(oscillator(), RECTANGLE, between, depth=1.0) / NATURAL
             quantity = f"edge of the unstable band around {inside:g}, w_m/w_n"
-            rows.append(printed("G5", EXACT, quantity, edge, found))
+            rows.append(printed("G5", EXACT, quantity, edge, border))
     for damping, ratio, value in (
         (0.02, 2.0, "1.1198031"),
         (0.02, 1.0, "1.0608524"),
@@ -130,11 +130,11 @@ def rectangular_bands() -> tuple[Row, ...]:
         (0.05, 2.0, "1.0124401"),
         (0.05, 1.0, ".8660985"),
     ):
-        found = verdict_at(loaded(RECTANGLE, damping=2.0 * damping), ratio * NATURAL)
-        quantity = f"decay {damping}, w_m/w_n = {ratio:g}: largest multiplier of the verdict ({found.method})"
-        rows.append(printed("G5", EXACT, quantity, value, abs(found.multipliers[0])))
+        border = verdict_at(loaded(RECTANGLE, damping=2.0 * damping), ratio * NATURAL)
+        quantity = f"decay {damping}, w_m/w_n = {ratio:g}: largest multiplier of the verdict ({border.method})"
+        rows.append(printed("G5", EXACT, quantity, value, abs(border.multipliers[0])))
         name = f"decay {damping}, w_m/w_n = {ratio:g}: stable (1 yes)"
-        rows.append(counted("G5", EXACT, name, int(float(value) < 1.0), found.stable is True))
+        rows.append(counted("G5", EXACT, name, int(float(value) < 1.0), border.stable is True))
     return tuple(rows)
 
 
@@ -142,17 +142,17 @@ def verdict_against_fixed_point() -> tuple[Row, ...]:
     """G6: the verdict where the fixed point of the spectral iteration says nothing about stability."""
     rows, radius = [], {2.0: ".096", 1.0: "1.022", 0.5: ".579"}
     for ratio, value in ((2.0, "1.090"), (1.0, "1.005")):
-        found = verdict_at(loaded(RECTANGLE, damping=0.06 * NATURAL), ratio * NATURAL)
+        verdict = verdict_at(loaded(RECTANGLE, damping=0.06 * NATURAL), ratio * NATURAL)
         name = f"damping ratio 0.03, w_m/w_n = {ratio:g}:"
         note = f"the fixed point has the radius {radius[ratio]}"
         quantity = f"{name} largest multiplier of the verdict"
         source = f"operator of 200 harmonics, exponentials ({REPEATED})"
-        rows.append(printed("G6", source, quantity, value, abs(found.multipliers[0]), note=note))
-        rows.append(counted("G6", source, f"{name} stable (1 yes)", 0, found.stable is True, note=note))
-    found = verdict_at(loaded(RECTANGLE, damping=0.06 * NATURAL), 0.5 * NATURAL)
+        rows.append(printed("G6", source, quantity, value, abs(verdict.multipliers[0]), note=note))
+        rows.append(counted("G6", source, f"{name} stable (1 yes)", 0, verdict.stable is True, note=note))
+    verdict = verdict_at(loaded(RECTANGLE, damping=0.06 * NATURAL), 0.5 * NATURAL)
     quantity = "damping ratio 0.03, w_m/w_n = 0.5: stable (1 yes)"
     rows.append(
-        counted("G6", f"operator of 200 harmonics, exponentials ({REPEATED})", quantity, 1, found.stable is True)
+        counted("G6", f"operator of 200 harmonics, exponentials ({REPEATED})", quantity, 1, verdict.stable is True)
     )
     quantity = "damping ratio 0.03, w_m/w_n = 2: largest multiplier by shooting less that of the verdict"
     rows.append(at_most("G6", "verdict", quantity, 1e-9, shooting_gap()))
@@ -162,5 +162,5 @@ def verdict_against_fixed_point() -> tuple[Row, ...]:
 def shooting_gap() -> float:
     """Largest multiplier by shooting less that of the verdict at w_m/w_n = 2, damping ratio 0.03."""
     problem, omega = loaded(RECTANGLE, damping=0.06 * NATURAL), 2.0 * NATURAL
-    found = solve_shooting(problem, omega, settle=0, harmonics=1)
-    return abs(found.multipliers[0]) - abs(verdict_at(problem, omega).multipliers[0])
+    shot = solve_shooting(problem, omega, settle=0, harmonics=1)
+    return abs(shot.multipliers[0]) - abs(verdict_at(problem, omega).multipliers[0])

@@ -88,9 +88,9 @@ def frequencies() -> tuple[Row, ...]:
     rows = []
     for planets, published in PUBLISHED.items():
         modes = gear_set_modes(lin_parker_set(planets))
-        found = by_kind(modes)
+        modes_by_kind = by_kind(modes)
         multiplicity = (1, 2, planets - 3)
-        ours = [found[kind][::times] if times else () for kind, times in zip(KINDS, multiplicity)]
+        ours = [modes_by_kind[kind][::times] if times else () for kind, times in zip(KINDS, multiplicity)]
         for kind, values, texts in zip(KINDS, ours, published, strict=True):
             for text, value in zip(texts, values, strict=True):
                 name = f"{planets} planets, {kind} mode [Hz]"
@@ -276,12 +276,12 @@ def balance() -> tuple[Row, ...]:
 
 def wind_turbine() -> tuple[Row, ...]:
     """Lowest modes of the wind turbine set."""
-    found = by_kind(gear_set_modes(wind_turbine_b()))
+    modes_by_kind = by_kind(gear_set_modes(wind_turbine_b()))
     others = independent.wind_turbine_b().frequencies(independent.PLANAR)
     rows = []
     for kind, values in (
-        ("translational", found["translational"][::2][:2]),
-        ("rotational", found["rotational"][:2]),
+        ("translational", modes_by_kind["translational"][::2][:2]),
+        ("rotational", modes_by_kind["rotational"][:2]),
     ):
         for value in values:
             reference = others[np.argmin(np.abs(others - value))]

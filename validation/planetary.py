@@ -128,8 +128,8 @@ def _pitch_point_pressure(s, force):
         ("planet-ring", s.planet, s.ring, s.working_pressure_angle_planet_ring, 312.44 / 0.891),
     )
     rows = []
-    for name, one, two, angle, reference in meshes:
-        radii = [gear.base_radius * math.tan(angle) for gear in (one, two)]
+    for name, first, two, angle, reference in meshes:
+        radii = [gear.base_radius * math.tan(angle) for gear in (first, two)]
         radius = relative_radius(radii[0], -radii[1] if two.internal else radii[1])
         pressure = hertz_line(force / s.sun.face_width, radius, modulus).peak_pressure * 1e-6
         quantity = f"contact pressure at the pitch point, {name} [MPa]"

@@ -400,7 +400,7 @@ def refused_graphs() -> tuple[Refused, ...]:
     balance, share = ("E-LOAD-BALANCE",), ("E-TORQUE",)
     a_set = planetary_condition("set", "in", "out", "ring", 27, 108)
 
-    one, other = pair_condition("one", "in", "out", 20, 30), pair_condition("other", "in", "out", 20, 31)
+    first, other = pair_condition("one", "in", "out", 20, 30), pair_condition("other", "in", "out", 20, 31)
     equal = pair_condition("other", "in", "out", 40, 60)
     triangle = (
         pair_condition("1", "in", "b", 20, 30),
@@ -415,20 +415,22 @@ def refused_graphs() -> tuple[Refused, ...]:
         Refused(
             graph("in out ring", a_set, outputs=("out", "ring")), free, ("'out' and 'ring' turn freely", "a speed")
         ),
-        Refused(graph("in out loose", one), free, ("'loose' turns freely",)),
-        Refused(graph("in out", one, other), lock, ("'one' and 'other' lock", "'in' and 'out' cannot turn")),
+        Refused(graph("in out loose", first), free, ("'loose' turns freely",)),
+        Refused(graph("in out", first, other), lock, ("'one' and 'other' lock", "'in' and 'out' cannot turn")),
         Refused(graph("in b out", *triangle), lock, ("'1', '2' and '3' lock",)),
-        Refused(graph("in out", one, joined=(("in", "out"),)), lock, ("'one' locks",)),
+        Refused(graph("in out", first, joined=(("in", "out"),)), lock, ("'one' locks",)),
         Refused(
-            graph("in out more", one, other, pair_condition("tail", "out", "more", 9, 9)),
+            graph("in out more", first, other, pair_condition("tail", "out", "more", 9, 9)),
             lock,
             ("'one' and 'other' lock",),
         ),
         Refused(graph("in out ring", a_set, held=("ring", "in"), speeds={}), lock, ("'in' and 'ring' held",)),
-        Refused(graph("in out", one, speeds={"in": 30.0, "out": 20.0}), speed, ("'out' does not fit that of",), "-20 "),
-        Refused(graph("in out", one, speeds={"in": 3.0, "out": -2.0 - 1e-8}), speed, ("'out' does not fit",), "-2 "),
         Refused(
-            graph("in out end", one, joined=(("out", "end"),), speeds={"out": 3.0, "end": -3.0}),
+            graph("in out", first, speeds={"in": 30.0, "out": 20.0}), speed, ("'out' does not fit that of",), "-20 "
+        ),
+        Refused(graph("in out", first, speeds={"in": 3.0, "out": -2.0 - 1e-8}), speed, ("'out' does not fit",), "-2 "),
+        Refused(
+            graph("in out end", first, joined=(("out", "end"),), speeds={"out": 3.0, "end": -3.0}),
             speed,
             ("'end' does not fit", "joined"),
             "3 ",
@@ -440,25 +442,25 @@ def refused_graphs() -> tuple[Refused, ...]:
             "0 ",
         ),
         Refused(
-            graph("in out", one, outputs=(), torques={"in": 10.0, "out": 14.0}), balance, ("'in' and 'out'",), "15 "
+            graph("in out", first, outputs=(), torques={"in": 10.0, "out": 14.0}), balance, ("'in' and 'out'",), "15 "
         ),
-        Refused(graph("in out", one, outputs=()), balance, ("nothing takes the torque on shaft 'in'",), "0 "),
-        Refused(graph("in out", one, outputs=("in", "out"), torques={}), share, ("'in' and 'out' do not follow",)),
-        Refused(graph("in out", one, equal), share, ("'one' and 'other' carry torque",)),
+        Refused(graph("in out", first, outputs=()), balance, ("nothing takes the torque on shaft 'in'",), "0 "),
+        Refused(graph("in out", first, outputs=("in", "out"), torques={}), share, ("'in' and 'out' do not follow",)),
+        Refused(graph("in out", first, equal), share, ("'one' and 'other' carry torque",)),
         Refused(
-            graph("in out end", one, outputs=("out", "end"), joined=(("out", "end"),)), share, ("'out' and 'end'",)
+            graph("in out end", first, outputs=("out", "end"), joined=(("out", "end"),)), share, ("'out' and 'end'",)
         ),
         Refused(graph("in out ring", a_set, held=("ring",), outputs=("out", "in"), torques={}), share, ("'ring'",)),
         Refused(
-            graph("in out loose", one, equal, speeds={"in": 1.0, "out": 1.0}),
+            graph("in out loose", first, equal, speeds={"in": 1.0, "out": 1.0}),
             ("E-MECHANISM", "E-SPEED", "E-TORQUE"),
             ("'loose'",),
         ),
-        Refused(graph("in out", one, held=("x",)), ("E-CHOICE",), ("no shaft 'x'",)),
-        Refused(graph("in out in", one), ("E-DUPLICATE",), ("shaft 'in' stands twice",)),
-        Refused(graph("in out", one, held=("out",)), ("E-DUPLICATE",), ("both held and output",)),
-        Refused(graph("in out", one, torques={"in": 1.0, "out": 2.0}), ("E-DUPLICATE",), ("given torque",)),
-        Refused(graph("in out", one, torques={"in": math.nan}), ("E-FINITE",), ("torque of shaft 'in'",)),
+        Refused(graph("in out", first, held=("x",)), ("E-CHOICE",), ("no shaft 'x'",)),
+        Refused(graph("in out in", first), ("E-DUPLICATE",), ("shaft 'in' stands twice",)),
+        Refused(graph("in out", first, held=("out",)), ("E-DUPLICATE",), ("both held and output",)),
+        Refused(graph("in out", first, torques={"in": 1.0, "out": 2.0}), ("E-DUPLICATE",), ("given torque",)),
+        Refused(graph("in out", first, torques={"in": math.nan}), ("E-FINITE",), ("torque of shaft 'in'",)),
     )
 
 
@@ -474,7 +476,10 @@ def power_of_shares(flow: PowerFlow) -> set[F]:
     loads = {name for shares in flow.torque_ratio.values() for name in shares}
     shafts = flow.speed_ratio
     return {
-        sum((flow.speed_ratio[one].get(speed, F(0)) * flow.torque_ratio[one].get(load, F(0)) for one in shafts), F(0))
+        sum(
+            (flow.speed_ratio[shaft].get(speed, F(0)) * flow.torque_ratio[shaft].get(load, F(0)) for shaft in shafts),
+            F(0),
+        )
         for speed in given
         for load in loads
     }
@@ -551,28 +556,48 @@ def frequencies() -> tuple[Row, ...]:
         held=("ring",),
         outputs=("out",),
     )
-    found = stage_frequencies(stage, flow.speed, planet_teeth={"planet": 40}, planets=3)
+    frequencies = stage_frequencies(stage, flow.speed, planet_teeth={"planet": 40}, planets=3)
     carrier = 3100.0 / 60.0 / 5.0
     paper = "housing modulation paper: 1116 Hz at 3100 rpm"
     return (
         within(
-            "PF", paper, "27/40/108: mesh of sun and planet [Hz]", 1116.0, found.mesh_frequency["sun-planet"], 1e-14
+            "PF",
+            paper,
+            "27/40/108: mesh of sun and planet [Hz]",
+            1116.0,
+            frequencies.mesh_frequency["sun-planet"],
+            1e-14,
         ),
         within(
-            "PF", paper, "27/40/108: mesh of planet and ring [Hz]", 1116.0, found.mesh_frequency["planet-ring"], 1e-14
+            "PF",
+            paper,
+            "27/40/108: mesh of planet and ring [Hz]",
+            1116.0,
+            frequencies.mesh_frequency["planet-ring"],
+            1e-14,
         ),
         within(
             "PF",
             "3 carrier turns",
             "three planets past a sensor [Hz]",
             3 * carrier,
-            found.passing_frequency["casing"],
+            frequencies.passing_frequency["casing"],
             1e-14,
         ),
         within(
-            "PF", "rolling", "planet about its pin [Hz]", -1116.0 / 40, found.planet_spin["planet"] / math.tau, 1e-14
+            "PF",
+            "rolling",
+            "planet about its pin [Hz]",
+            -1116.0 / 40,
+            frequencies.planet_spin["planet"] / math.tau,
+            1e-14,
         ),
         within(
-            "PF", "27 x 40 teeth", "hunting tooth period [s]", 27 * 40 / 1116.0, found.hunting_time["sun-planet"], 1e-14
+            "PF",
+            "27 x 40 teeth",
+            "hunting tooth period [s]",
+            27 * 40 / 1116.0,
+            frequencies.hunting_time["sun-planet"],
+            1e-14,
         ),
     )

@@ -197,35 +197,37 @@ def planet_comparison(*, flank_elements: int = 8, refine: float = 0.5) -> Compar
 
 def thin_ring() -> tuple[Row, ...]:
     """The field of the thin ring and the flanks at its meshes."""
-    found = ring_comparison()
+    comparison = ring_comparison()
     name = "rim of one module, all tooth loads of the ring: "
     same = "all 108 sectors in one sparse solution, same elements"
     return (
-        at_most("rim", same, name + "displacement, relative", 1e-9, found.same_grid),
-        at_most("rim", SOURCE, name + "displacement of flanks, tips and rim, relative", 0.01, found.field),
-        at_most("rim", SOURCE, name + "displacement of the outer surface, relative", 0.01, found.rim),
-        at_most("rim", SOURCE, name + "loaded flanks in the contact solution, relative", 0.01, found.flanks),
-        information("rim", "definition", name + "largest displacement [um]", None, 1e6 * found.largest),
+        at_most("rim", same, name + "displacement, relative", 1e-9, comparison.same_grid),
+        at_most("rim", SOURCE, name + "displacement of flanks, tips and rim, relative", 0.01, comparison.field),
+        at_most("rim", SOURCE, name + "displacement of the outer surface, relative", 0.01, comparison.rim),
+        at_most("rim", SOURCE, name + "loaded flanks in the contact solution, relative", 0.01, comparison.flanks),
+        information("rim", "definition", name + "largest displacement [um]", None, 1e6 * comparison.largest),
     )
 
 
 def planet_between_its_meshes() -> tuple[Row, ...]:
     """A planet loaded by the sun, seen where it meets the ring."""
-    found = planet_comparison()
+    comparison = planet_comparison()
     name = "planet loaded by the sun alone: "
     same = "all 40 sectors in one sparse solution, same elements"
     seen = name + "flanks that meet the ring, in the contact solution, relative"
     return (
-        at_most("rim", same, name + "displacement, relative", 1e-9, found.same_grid),
-        at_most("rim", SOURCE, name + "displacement of flanks and tips, relative", 0.01, found.field),
-        at_most("rim", SOURCE, seen, 0.01, found.flanks),
-        information("rim", "definition", name + "flanks that meet the ring move by [nm]", None, 1e9 * found.opposite),
+        at_most("rim", same, name + "displacement, relative", 1e-9, comparison.same_grid),
+        at_most("rim", SOURCE, name + "displacement of flanks and tips, relative", 0.01, comparison.field),
+        at_most("rim", SOURCE, seen, 0.01, comparison.flanks),
+        information(
+            "rim", "definition", name + "flanks that meet the ring move by [nm]", None, 1e9 * comparison.opposite
+        ),
     )
 
 
 def sharing_with_a_thin_rim() -> tuple[Row, ...]:
     """Load sharing with a pin error, rim of one module and rim of the reference set."""
-    thin, thick = (static_with(thin=one).cycle.load_share[0].mean() for one in (True, False))
+    thin, thick = (static_with(thin=rim).cycle.load_share[0].mean() for rim in (True, False))
     name = f"pin 1 behind by {PIN_ERROR}, elastic members: share of planet 1"
     note = "reference: rim of 17.1 mm; femgear: rim of one module"
     uneven = (1 / 3 - thin) / (1 / 3 - thick)

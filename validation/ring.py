@@ -210,8 +210,8 @@ def _sector_modes(gear, diameters, state, *, refine: float = 1.0) -> np.ndarray:
 
 def _whole_modes(grid, diameters, state) -> np.ndarray:
     """The same of a whole ring, the mean of the two modes of a pair, which its grid splits a little."""
-    found, number = free_modes(grid, reference_material(), state, count=16)
-    return np.array([found[number == n][: 1 if n == 0 else 2].mean() for n in diameters])
+    frequencies, number = free_modes(grid, reference_material(), state, count=16)
+    return np.array([frequencies[number == n][: 1 if n == 0 else 2].mean() for n in diameters])
 
 
 def whole_ring() -> tuple[Row, ...]:
@@ -225,7 +225,7 @@ def whole_ring() -> tuple[Row, ...]:
     coarse, fine = (whole_grid(gear, refine=refine) for refine in (1, 2))
     plane, diameters = {"tooth": "plane stress", "body": "plane stress"}, (*ELSEWHERE, 6)
     ours, whole = _sector_modes(gear, diameters, plane), _whole_modes(fine, diameters, plane)
-    own = np.abs(_sector_modes(gear, diameters, plane, refine=2.0) / ours - 1.0)
+    errors = np.abs(_sector_modes(gear, diameters, plane, refine=2.0) / ours - 1.0)
     other = np.abs(_whole_modes(coarse, diameters, plane) / whole - 1.0)
     mixed = _sector_modes(gear, DIAMETERS, RING_STATE), _whole_modes(fine, DIAMETERS, RING_STATE)
     source = "whole ring of 108 teeth, cubic elements (validation/whole_ring.py)"
@@ -234,11 +234,11 @@ def whole_ring() -> tuple[Row, ...]:
         for n, value, reference in zip(numbers, values, references, strict=True):
             k = diameters.index(n)
             note = (
-                f"gate: changes on halving all edges in plane stress, {100 * own[k]:.1g} % of femgear's and "
+                f"gate: changes on halving all edges in plane stress, {100 * errors[k]:.1g} % of femgear's and "
                 f"{100 * other[k]:.1g} % of the whole ring's"
             )
             name = f"free toothed ring, {words}, n = {n} [Hz]"
-            rows.append(within("ring", source, name, reference, value, own[k] + other[k], note=note))
+            rows.append(within("ring", source, name, reference, value, errors[k] + other[k], note=note))
     return tuple(rows)
 
 
@@ -252,17 +252,17 @@ def turning_carrier() -> tuple[Row, ...]:
     distance = reference_static().planetary_set.centre_distance
     elastic = np.flatnonzero(basis.modes.frequency > 0.0)
     below = elastic[basis.modes.frequency[elastic] < 10e3]
-    found = campbell_data(
+    campbell = campbell_data(
         lambda speed: turning_system(basis.model, centre_distance=distance, carrier_speed=speed),
         np.linspace(0.0, FASTEST, 13),
         basis.modes.mesh_stiffness,
         count=len(below),
     )
-    still, last = found.frequency[0], found.frequency[-1]
-    change = np.abs(found.frequency / still - 1.0).max(axis=0)
-    shares = ring_wave_shares(basis.model, found.tracked.shape[-1])
+    still, last = campbell.frequency[0], campbell.frequency[-1]
+    change = np.abs(campbell.frequency / still - 1.0).max(axis=0)
+    shares = ring_wave_shares(basis.model, campbell.tracked.shape[-1])
     wave = shares.argmax(axis=0) - len(shares) // 2
-    heard = last - wave * FASTEST / (2.0 * np.pi)
+    on_the_ring = last - wave * FASTEST / (2.0 * np.pi)
     why = "these waves run around the ring. The next row has their frequency on the ring itself"
     rows = list(_bare_ring_turning(basis))
     first = np.append(True, np.diff(still) > 1e-6 * still[1:])
@@ -276,8 +276,8 @@ def turning_carrier() -> tuple[Row, ...]:
         largest = change[members].max()
         rows.append(at_most("turning", SLIGHT, text, CLAIM, largest, note=note, explanation=why))
         if largest > CLAIM:
-            away = np.abs(heard[members] / still[i] - 1.0).max()
-            ends = ", ".join(f"{f:.2f}" for f in np.sort(heard[members]))
+            away = np.abs(on_the_ring[members] / still[i] - 1.0).max()
+            ends = ", ".join(f"{f:.2f}" for f in np.sort(on_the_ring[members]))
             text = f"{name}, strongest wave as heard on the ring: largest change"
             rows.append(at_most("turning", SLIGHT, text, CLAIM, away, note=f"{ends} Hz at 120 rad/s"))
         elif len(members) == 1 and wave[i] and shares[:, i].sum() > 0.5:
@@ -298,14 +298,14 @@ def _bare_ring_turning(basis) -> list[Row]:
 
     alone = replace(basis.model.system, W=np.zeros((len(basis.model.system.M), 0)), flexibility=None)
     alone = turning_system(replace(basis.model, system=alone), centre_distance=0.0, carrier_speed=FASTEST)
-    found = complex_modes(alone, np.zeros(0), speed=FASTEST).frequency
+    frequencies = complex_modes(alone, np.zeros(0), speed=FASTEST).frequency
     rows, modes = [], basis.ring.modes
     for n in range(1, 6):
         lowest, split = modes.frequency[modes.nodal_diameter == n].min(), n * FASTEST / (2.0 * np.pi)
         for sign, source in ((-1, "f - n Omega / 2 pi"), (1, "f + n Omega / 2 pi")):
             seen = lowest + sign * split
             text = f"ring alone on its foundation, n = {n}, seen from 120 rad/s [Hz]"
-            nearest = found[np.argmin(np.abs(found - seen))]
+            nearest = frequencies[np.argmin(np.abs(frequencies - seen))]
             rows.append(within("turning", source, text, seen, nearest, 1e-9))
         text = f"ring alone, n = {n}, in the carrier frame: n Omega / 2 pi over f = {lowest:.2f} Hz"
         rows.append(information("turning", SLIGHT, text, CLAIM, split / lowest, note="on the ring: no change"))

@@ -78,10 +78,10 @@ def state_of(problem, balance: PeriodicSolution) -> tuple[np.ndarray, np.ndarray
     return lines.sum(axis=1).real, (1j * balance.line_frequency * lines).sum(axis=1).real
 
 
-def difference(one: np.ndarray, other: np.ndarray) -> float:
+def difference(first: np.ndarray, other: np.ndarray) -> float:
     """Largest difference of the lines that both have, relative to the largest one that fluctuates."""
-    count = min(one.shape[1], other.shape[1])
-    return float(np.abs(one[:, :count] - other[:, :count]).max() / np.abs(one[:, 1:count]).max())
+    count = min(first.shape[1], other.shape[1])
+    return float(np.abs(first[:, :count] - other[:, :count]).max() / np.abs(first[:, 1:count]).max())
 
 
 def settled(problem, frequency: float, *, periods: int, tolerance: float, harmonics: int, start=None) -> Settled:
@@ -96,8 +96,8 @@ def settled(problem, frequency: float, *, periods: int, tolerance: float, harmon
 
 def motion(problem, frequency: float, shooting: ShootingSolution, *, harmonics, samples, start=None) -> Motion:
     """Balance and verdict beside a motion found by shooting."""
-    found = solve_harmonic_balance(problem, frequency, harmonics=harmonics, samples=samples, start=start)
-    return Motion(problem, frequency, samples, found, shooting, found.verdict)
+    solution = solve_harmonic_balance(problem, frequency, harmonics=harmonics, samples=samples, start=start)
+    return Motion(problem, frequency, samples, solution, shooting, solution.verdict)
 
 
 @cache
@@ -107,9 +107,9 @@ def duffing_motion() -> tuple[Motion, Settled]:
     line = one_harmonic(amplitude, 1.2)
     start = np.zeros((1, 16), complex)
     start[0, 1] = line
-    found = motion(duffing(), 1.2, shooting_motion(amplitude), harmonics=15, samples=256, start=start)
+    computed = motion(duffing(), 1.2, shooting_motion(amplitude), harmonics=15, samples=256, start=start)
     begin = ([line.real], [-1.2 * line.imag])
-    return found, settled(duffing(), 1.2, periods=120, tolerance=1e-9, harmonics=15, start=begin)
+    return computed, settled(duffing(), 1.2, periods=120, tolerance=1e-9, harmonics=15, start=begin)
 
 
 def gear_pair(depth: float, backlash: float) -> NonlinearSystem:
@@ -123,8 +123,8 @@ def pair_motion(back: bool) -> tuple[Motion, Settled]:
     """(b) Gear pair whose teeth part, or part and strike their back flanks too."""
     problem, omega = (gear_pair(0.5, 0.1), 0.9) if back else (gear_pair(0.3, 1.0), 0.92)
     shot = solve_shooting(problem, omega, settle=40, harmonics=32, samples=8192)
-    found = motion(problem, omega, shot, harmonics=24, samples=8192)
-    return found, settled(problem, omega, periods=50, tolerance=1e-9, harmonics=24)
+    computed = motion(problem, omega, shot, harmonics=24, samples=8192)
+    return computed, settled(problem, omega, periods=50, tolerance=1e-9, harmonics=24)
 
 
 def planetary_train(damping: float = 0.05, backlash: float = 20e-6) -> NonlinearSystem:
@@ -148,26 +148,26 @@ def train_motion(backlash: float = 20e-6) -> Motion:
 @cache
 def train_settled(long: bool) -> Settled:
     """(c) Integrated: 40 periods from the motion balanced with 32 harmonics, or 900 from rest."""
-    found = train_motion()
-    problem, omega = found.problem, found.frequency
-    options = {"tolerance": 1e-9, "harmonics": found.harmonics}
+    computed = train_motion()
+    problem, omega = computed.problem, computed.frequency
+    options = {"tolerance": 1e-9, "harmonics": computed.harmonics}
     if long:
         return settled(problem, omega, periods=900, **options)
     # the velocities of a motion with corners need more lines than its deflections
-    fine = solve_harmonic_balance(problem, omega, harmonics=32, samples=4096, start=found.balance)
+    fine = solve_harmonic_balance(problem, omega, harmonics=32, samples=4096, start=computed.balance)
     return settled(problem, omega, periods=40, start=state_of(problem, fine), **options)
 
 
-def rows_of(name: str, found: Motion, run: Settled, *, change: float) -> tuple[Row, ...]:
+def rows_of(name: str, computed: Motion, run: Settled, *, change: float) -> tuple[Row, ...]:
     """Differences of the routes, the verdict, and whether teeth part and the integration has settled."""
-    balance, shot, case = found.balance.deflection, found.shooting.solution, "routes"
+    balance, shot, case = computed.balance.deflection, computed.shooting.solution, "routes"
     integration = f"DOP853 with contact events, {run.periods} periods, tolerance {run.tolerance:g}"
-    lines = f"{name}: harmonic balance ({found.harmonics} harmonics, {found.samples} samples)"
-    both = found.balance.converged and shot.converged
-    largest = abs(found.verdict.multipliers[0])
+    lines = f"{name}: harmonic balance ({computed.harmonics} harmonics, {computed.samples} samples)"
+    both = computed.balance.converged and shot.converged
+    largest = abs(computed.verdict.multipliers[0])
     gaps = [
-        difference(one, other)
-        for one, other in (
+        difference(motion_of_route, other)
+        for motion_of_route, other in (
             (shot.deflection, balance),
             (run.lines, balance),
             (run.lines, shot.deflection),
@@ -179,21 +179,21 @@ def rows_of(name: str, found: Motion, run: Settled, *, change: float) -> tuple[R
         at_most(case, integration, f"{name}: shooting against integration", GATE, gaps[2]),
         at_most(case, integration, f"{name}: change of the lines in the last period", change, run.change),
         counted(case, "solvers", f"{name}: balance and shooting converged (1 yes)", 1, both),
-        counted(case, "Floquet verdict", f"{name}: stable (1 yes)", 1, found.verdict.stable is True),
+        counted(case, "Floquet verdict", f"{name}: stable (1 yes)", 1, computed.verdict.stable is True),
         information(case, "Floquet verdict", f"{name}: largest multiplier", None, largest),
     )
 
 
-def open_share(found: Motion) -> tuple[float, float]:
+def open_share(computed: Motion) -> tuple[float, float]:
     """Shares of the period in which some drive flank is open, and in which some back flank touches."""
-    mesh = found.problem.elements[0]
-    x = found.balance.at(np.arange(2000) / 2000 * 2.0 * np.pi / found.frequency)[:, mesh.columns[:, 0]]
+    mesh = computed.problem.elements[0]
+    x = computed.balance.at(np.arange(2000) / 2000 * 2.0 * np.pi / computed.frequency)[:, mesh.columns[:, 0]]
     return float((x < 0.0).any(axis=1).mean()), float((x < -mesh.backlash).any(axis=1).mean())
 
 
-def parting(name: str, found: Motion) -> tuple[Row, ...]:
+def parting(name: str, computed: Motion) -> tuple[Row, ...]:
     """Shares of the period without contact and on the back flanks."""
-    apart, back = open_share(found)
+    apart, back = open_share(computed)
     return (
         counted("routes", "motion", f"{name}: teeth part (1 yes)", 1, apart > 0.0),
         information("routes", "motion", f"{name}: share of the period with a mesh apart", None, apart),
@@ -208,26 +208,26 @@ def duffing_routes() -> tuple[Row, ...]:
 
 def pair_routes() -> tuple[Row, ...]:
     """(b) One mesh with backlash whose drive flanks part."""
-    name, (found, run) = "(b) gear pair, drive flanks", pair_motion(False)
-    return rows_of(name, found, run, change=1e-6) + parting(name, found)
+    name, (computed, run) = "(b) gear pair, drive flanks", pair_motion(False)
+    return rows_of(name, computed, run, change=1e-6) + parting(name, computed)
 
 
 def pair_routes_on_both_flanks() -> tuple[Row, ...]:
     """(b) One mesh with less backlash, which strikes its back flanks."""
-    name, (found, run) = "(b) gear pair, both flanks", pair_motion(True)
-    return rows_of(name, found, run, change=1e-6) + parting(name, found)
+    name, (computed, run) = "(b) gear pair, both flanks", pair_motion(True)
+    return rows_of(name, computed, run, change=1e-6) + parting(name, computed)
 
 
 def train_routes() -> tuple[Row, ...]:
     """(c) Planetary train, integration from the balanced motion, and fewer harmonics."""
-    name, found = "(c) train of 18 dof, 7400 Hz", train_motion()
-    rows = rows_of(name, found, train_settled(False), change=1e-6) + parting(name, found)
+    name, computed = "(c) train of 18 dof, 7400 Hz", train_motion()
+    rows = rows_of(name, computed, train_settled(False), change=1e-6) + parting(name, computed)
     for count in (8, 12):
-        fewer = solve_harmonic_balance(found.problem, found.frequency, harmonics=count, samples=2048)
-        error = difference(found.shooting.solution.deflection, fewer.deflection)
+        fewer = solve_harmonic_balance(computed.problem, computed.frequency, harmonics=count, samples=2048)
+        error = difference(computed.shooting.solution.deflection, fewer.deflection)
         quantity = f"{name}: harmonic balance ({count} harmonics, 2048 samples) against shooting"
         rows += (at_most("routes", "shooting", quantity, GATE, error),)
-    size = len(found.problem.system.M)
+    size = len(computed.problem.system.M)
     return (*rows, counted("routes", "3 (N + 3)", f"{name}: degrees of freedom", 18, size))
 
 

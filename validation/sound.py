@@ -56,8 +56,8 @@ def outgoing(n: int, near: float, far: float) -> complex:
 
     places = sorted({near, far}, reverse=True)
     options = {"method": "DOP853", "rtol": 1e-12, "atol": 1e-14, "t_eval": places}
-    found = solve_ivp(equation, (start, near), [series(start), slope], **options)
-    return found.y[0, 0] / found.y[1, -1]
+    outwards = solve_ivp(equation, (start, near), [series(start), slope], **options)
+    return outwards.y[0, 0] / outwards.y[1, -1]
 
 
 def efficiency() -> tuple[Row, ...]:
@@ -146,10 +146,10 @@ def power() -> tuple[Row, ...]:
         order = np.array([108 - n])
         lines = SensorLines(order, np.array([1e-6 + 2e-6j]), np.array(60.0), 0.3, 108, "exact")
         angles = np.linspace(0.0, 2 * np.pi, 33)[:-1]
-        heard = [sound_pressure(lines, cylinder, Microphone(far - 0.1, angle))[0] for angle in angles]
+        pressures = [sound_pressure(lines, cylinder, Microphone(far - 0.1, angle))[0] for angle in angles]
         velocity = abs(order[0] * 60.0 * lines.displacement[0])
         ka, surface = lines.frequency[0] * 2 * np.pi * 0.1 / 343.0, 2 * np.pi * 0.1
-        flow = np.mean(np.abs(heard) ** 2) / (2 * 1.204 * 343.0) * 2 * np.pi * far
+        flow = np.mean(np.abs(pressures) ** 2) / (2 * 1.204 * 343.0) * 2 * np.pi * far
         over = flow / (1.204 * 343.0 * surface * velocity**2 / 2)
         quantity = f"1031 Hz, n = {n}: sigma_n against the intensity over a circle of 5 km"
         rows.append(within("power", "intensity p^2/(rho c)", quantity, over, float(radiation_efficiency(n, ka)), 1e-6))
@@ -177,7 +177,7 @@ def equivalent() -> tuple[Row, ...]:
     area = np.diff(np.linspace(0, 4 * np.pi * a**2, 101) ** 1.5) / np.sqrt(4 * np.pi * a**2)
     velocity = np.full((1, len(area)), 1e-3 * np.exp(0.7j))
     for ka, gate in ((1.0, 1e-12), (5.0, 1e-12), (200.0, 1e-12)):
-        pressure, power = (one[0] for one in equivalent_sound(velocity, area, rho, c, 1.0))
+        pressure, power = (spectrum[0] for spectrum in equivalent_sound(velocity, area, rho, c, 1.0))
         exact = ka**2 / (1 + ka**2)
         # waves in all directions: pressure at 1 m, power through its sphere
         far = rho * c * 1e-3 * a * ka / np.sqrt(1 + ka**2)
@@ -221,13 +221,13 @@ def signals() -> tuple[Row, ...]:
     values[0] = 0.4
     speed, samples = 2 * np.pi * 50 / 60, 8 * 57_600
     signal = sampled_signal(order, values, speed, samples=samples)
-    heard = values[order * 50 / 60 < 24e3]
-    power_of_lines = heard[0].real ** 2 + 0.5 * (np.abs(heard[1:]) ** 2).sum()
+    audible = values[order * 50 / 60 < 24e3]
+    power_of_lines = audible[0].real ** 2 + 0.5 * (np.abs(audible[1:]) ** 2).sum()
     ours, expected = np.sqrt(np.mean(signal**2)), np.sqrt(power_of_lines)
-    some = rng.integers(0, samples, 40)
-    turned = np.outer(some * (50 / 60 / 48e3), order[: len(heard)]) % 1.0
-    direct = (np.exp(2j * np.pi * turned) @ heard).real
-    error = np.abs(signal[some] - direct).max() / np.abs(heard).sum()
+    chosen = rng.integers(0, samples, 40)
+    turned = np.outer(chosen * (50 / 60 / 48e3), order[: len(audible)]) % 1.0
+    direct = (np.exp(2j * np.pi * turned) @ audible).real
+    error = np.abs(signal[chosen] - direct).max() / np.abs(audible).sum()
     name = "9 600 carrier orders at 50 rpm, 48 kHz, eight turns: "
     return (
         within("signal", "Parseval", name + "root mean square over that of the lines", expected, ours, 1e-12),

@@ -44,7 +44,9 @@ def nrel_stiffness() -> tuple[Row, ...]:
         (36, math.inf, 0.5039, 0.1171, s.contact_ratio_planet_ring),
     )
     # the standard takes the ring's shift with the sign of ISO 21771
-    outer, inner = ([0.862 * one for one in mesh_stiffness_method_b(*pair, dedendum=1.25)] for pair in pairs)
+    outer, inner = (
+        [0.862 * stiffness for stiffness in mesh_stiffness_method_b(*pair, dedendum=1.25)] for pair in pairs
+    )
     rows = []
     for name, value, ours in (
         ("sun-planet, c'", 12.240, outer[0]),

@@ -80,13 +80,13 @@ def iso_stiffness() -> tuple[Row, ...]:
     static = reference_static()
     s, cycle = static.planetary_set, static.cycle
     rows = []
-    for (name, mesh), one, two, ratio in (
+    for (name, mesh), first, two, ratio in (
         (MESHES[0], s.sun, s.planet, s.contact_ratio_sun_planet),
         (MESHES[1], s.planet, s.ring, s.contact_ratio_planet_ring),
     ):
         teeth = np.inf if two.internal else two.teeth
-        shifts = one.profile_shift, two.profile_shift
-        standard = mesh_stiffness_method_b(one.teeth, teeth, *shifts, contact_ratio=ratio, dedendum=1.25)[1]
+        shifts = first.profile_shift, two.profile_shift
+        standard = mesh_stiffness_method_b(first.teeth, teeth, *shifts, contact_ratio=ratio, dedendum=1.25)[1]
         width = 1e9 * s.sun.face_width
         for kind, stiffness in (("tangent", cycle.stiffness), ("secant", cycle.secant_stiffness)):
             ours = stiffness[mesh].mean() / width

@@ -341,8 +341,8 @@ def helical_fzg_gear() -> tuple[Row, ...]:
     ours = contact_stress(pair, force) * math.cos(degrees)
     note = "without 1/cos(beta) = Z_beta^2 of ISO over that of DIN 3990"
     rows.append(printed("H501", FZG_H, "sigma_H0 of DIN 3990 [MPa]", "627.27", ours, note=note))
-    own, generated = reported_test_gear(0.38), "fillet that the rack generates, point by point"
-    for gear, root in zip(own.gears, root_stresses(own, force), strict=True):
+    test_gear, generated = reported_test_gear(0.38), "fillet that the rack generates, point by point"
+    for gear, root in zip(test_gear.gears, root_stresses(test_gear, force), strict=True):
         chord, radius, _ = generated_section(gear)
         sizes = ("chord s_Fn", chord, root.chord), ("radius rho_F", radius, root.fillet_radius)
         for name, reference, number in sizes:

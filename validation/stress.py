@@ -40,13 +40,13 @@ ROOT_LOAD = 1000.0
 def nominal_flanks() -> tuple[Row, ...]:
     """D6: contact stress of the published report."""
     s, rows = nrel_set(), []
-    for name, one, two, values in (
+    for name, first, two, values in (
         ("sun_planet", s.sun, s.planet, ("573.40", "2.25", "0.936")),
         ("planet_ring", s.planet, s.ring, ("312.44", "2.85", "0.891")),
     ):
         working, ratio = (getattr(s, f"{what}_{name}") for what in ("working_pressure_angle", "contact_ratio"))
         ours = nominal_contact_stress(
-            one,
+            first,
             two,
             working_angle=working,
             contact_ratio=ratio,
@@ -58,7 +58,7 @@ def nominal_flanks() -> tuple[Row, ...]:
         # the report prints to one unit of the last digit, see `nrel_report`
         quantity = f"nominal contact stress sigma_H0 of {words} [MPa]"
         rows.append(printed("D6", KISSSOFT, quantity, values[0], ours * 1e-6, digits=2))
-        zone = zone_factor(one.pressure_angle, working)
+        zone = zone_factor(first.pressure_angle, working)
         rows.append(printed("D6", KISSSOFT, f"zone factor Z_H of {words}", values[1], zone))
         quantity = f"contact ratio factor Z_eps of {words}"
         rows.append(printed("D6", KISSSOFT, quantity, values[2], contact_ratio_factor(ratio)))
@@ -160,8 +160,8 @@ def roots_of_high_contact_ratio() -> tuple[Row, ...]:
     for gear, root in zip(pair.gears, roots, strict=True):
         nominal = nominal_root_stress(gear, contact_ratio=pair.contact_ratio, tangential_force=force)
         quantity = f"{gear.teeth} teeth of 40/50, addendum 1.25, eps_alpha 2.11: sigma_F0 [MPa]"
-        found, source = 1e-6 * float(root.tension.max()), "ISO 6336-3:2019, method B"
-        rows.append(within("root", source, quantity, 1e-6 * nominal.stress, found, 0.1))
+        tension, source = 1e-6 * float(root.tension.max()), "ISO 6336-3:2019, method B"
+        rows.append(within("root", source, quantity, 1e-6 * nominal.stress, tension, 0.1))
     return tuple(rows)
 
 
@@ -204,12 +204,12 @@ def whole_gear_roots(gear: Gear, roll: float, *, flank_elements: int, refine: fl
     Stresses are those of the elements, averaged at the nodes of the fillets; the force acts at the flank
     node nearest to the roll length, normal to the flank.
     """
-    one = mirror(mesh_outline(half_sector(gear, flank_elements=flank_elements, refine=refine)))
-    whole = rotated_copies(one, gear.teeth)
+    outline = mirror(mesh_outline(half_sector(gear, flank_elements=flank_elements, refine=refine)))
+    whole = rotated_copies(outline, gear.teeth)
     matrix = stiffness(whole, STEEL, state="plane strain", thickness=gear.face_width)
-    stations = flank_stations(one, gear)
+    stations = flank_stations(outline, gear)
     i = int(np.abs(stations.roll - roll).argmin())
-    first = copy_nodes(one, gear.teeth)[0]
+    first = copy_nodes(outline, gear.teeth)[0]
     force = np.zeros(2 * whole.n_nodes)
     force[2 * first[stations.nodes[i]] + np.array([0, 1])] = ROOT_LOAD * stations.normals[i]
     free = np.setdiff1d(np.arange(len(force)), node_dofs(np.unique(whole.boundaries["rim"])))
@@ -220,7 +220,7 @@ def whole_gear_roots(gear: Gear, roll: float, *, flank_elements: int, refine: fl
     np.add.at(count, whole.triangles, 1)
     xx, yy, xy = (total / count[:, None]).T
     middle, radius = 0.5 * (xx + yy), np.hypot(0.5 * (xx - yy), xy)
-    left, right = (first[np.unique(one.boundaries[f"fillet_{side}"])] for side in ("left", "right"))
+    left, right = (first[np.unique(outline.boundaries[f"fillet_{side}"])] for side in ("left", "right"))
     return float((middle + radius)[left].max()), float((middle - radius)[right].min())
 
 

@@ -83,7 +83,7 @@ def shafts() -> tuple[Row, ...]:
             rows.append(information("support", TIMOSHENKO, quantity, beam, ours, note=note))
         else:
             rows.append(within("support", TIMOSHENKO, quantity, beam, ours, gate))
-    beam, one, two = (
+    beam, single, two = (
         1e-6 / f[0, 0]
         for f in (
             timoshenko_flexibility(STEPPED, STEEL),
@@ -95,6 +95,6 @@ def shafts() -> tuple[Row, ...]:
     note = "the shoulder between the parts yields, which no beam knows"
     return (
         *rows,
-        information("support", TIMOSHENKO, name, beam, one, note=note),
-        within("support", "elements halved", name, two, one, 5e-3),
+        information("support", TIMOSHENKO, name, beam, single, note=note),
+        within("support", "elements halved", name, two, single, 5e-3),
     )

@@ -180,10 +180,10 @@ def whirl_frequencies(system: MechanicalSystem, speed: float) -> np.ndarray:
     from scipy.linalg import eig
 
     M, n = system.M, len(system.M)
-    zero, one = np.zeros((n, n)), np.eye(n)
+    zero, identity = np.zeros((n, n)), np.eye(n)
     assert system.gyroscopic is not None
-    state = np.block([[zero, one], [-system.K, -speed * system.gyroscopic]])
-    poles, states = eig(state, np.block([[one, zero], [zero, M]]))  # type: ignore[misc]
+    state = np.block([[zero, identity], [-system.K, -speed * system.gyroscopic]])
+    poles, states = eig(state, np.block([[identity, zero], [zero, M]]))  # type: ignore[misc]
     axes = np.array([name.split(": ")[1] for name in system.dofs])
     lateral = ~np.isin(axes, ("z", "rotation"))
     result = []

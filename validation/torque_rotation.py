@@ -109,8 +109,8 @@ def mesh_alone(
         problem = assemble_contact(setup, bodies, position)
         state = solve_contact(problem.H, problem.gap, np.ones((len(problem.gap), 1)), [force])
         secant.append(force / state.motions[0])
-        one = np.zeros(len(problem.gap), int)
-        tangent += tangent_stiffness(problem.H, state, one, problem.pair, problem.cell, 1).tolist()
+        body = np.zeros(len(problem.gap), int)
+        tangent += tangent_stiffness(problem.H, state, body, problem.pair, problem.cell, 1).tolist()
         loads = np.bincount(problem.pair, weights=state.loads)
         shares.append({int(i): float(loads[i]) for i in np.flatnonzero(loads)})
     return PairStiffness(
@@ -299,9 +299,9 @@ def depth_compliance() -> float:
     whole = closed_compliance([loaded, loaded, chain(plain, gear.teeth - 2)])
     schur = condense_sector(grid, K, count=gear.teeth, rim="rim", loads=loads, observations=seen).supported()
     cyclic = tooth_compliance(schur)
-    own, next_tooth = whole[n : 2 * n, :n], whole[3 * n : 4 * n, :n]
+    same_tooth, next_tooth = whole[n : 2 * n, :n], whole[3 * n : 4 * n, :n]
     size = np.abs(cyclic[0, :n, :n]).max()
-    return float(max(np.abs(own - cyclic[0, :n, :n]).max(), np.abs(next_tooth - cyclic[1, :n, :n]).max()) / size)
+    return float(max(np.abs(same_tooth - cyclic[0, :n, :n]).max(), np.abs(next_tooth - cyclic[1, :n, :n]).max()) / size)
 
 
 def same_depth() -> tuple[Row, ...]:

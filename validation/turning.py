@@ -73,10 +73,12 @@ def in_time(modes: Modes, excitation: MeshExcitation, frequency: float) -> tuple
     and the largest multiplier by `stability` and of the integrator.
     """
     basis, periods = low_modes(modes, 4000.0), excitation.periods
-    found = solve_spectral(basis, excitation, frequency, excitation_harmonics=1, response_harmonics=4, tolerance=1e-11)
-    one = replace(excitation, periods=1)
-    whole, multipliers = shooting(basis, one, frequency / periods, harmonics=periods, count=1024)
-    error = np.abs(sample(found.deflection[0], 1024) - whole).max() / np.ptp(whole, axis=1).max()
+    response = solve_spectral(
+        basis, excitation, frequency, excitation_harmonics=1, response_harmonics=4, tolerance=1e-11
+    )
+    single = replace(excitation, periods=1)
+    whole, multipliers = shooting(basis, single, frequency / periods, harmonics=periods, count=1024)
+    error = np.abs(sample(response.deflection[0], 1024) - whole).max() / np.ptp(whole, axis=1).max()
     ours = stability(basis, excitation, frequency, excitation_harmonics=1).modulus[0]
     return float(error), float(ours), float(np.abs(multipliers).max())
 
@@ -120,9 +122,9 @@ def time_integration() -> tuple[Row, ...]:
 
 def standstill() -> tuple[Row, ...]:
     """At 0.01 rpm the dynamics are the static record."""
-    found, rows = _solved("sun and pin"), []
-    response, state = found["dynamics"].response, found["modes"].state
-    for name, lines in (("deflection", found["dynamics"].dte[0]), ("force", response.force[0])):
+    solution, rows = _solved("sun and pin"), []
+    response, state = solution["dynamics"].response, solution["modes"].state
+    for name, lines in (("deflection", solution["dynamics"].dte[0]), ("force", response.force[0])):
         wanted = sample(harmonics_of(state.resampled(name, 3 * 8192), 18), 512)
         error = np.abs(sample(lines[:, :19], 512) - wanted).max() / np.ptp(wanted, axis=1).max()
         words = f"errors of sun and pin, 0.01 rpm, {name}: largest difference over peak to peak"

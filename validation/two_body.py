@@ -182,8 +182,8 @@ def two_body_contact(fraction: float, *, level: float = 1.0) -> PairContact:
         sun, planet, near, LINE_LOAD, centre=pair.centre_distance, base_radius=s.planet.base_radius
     )
     # the pressure is linear between the corners
-    one, two, length = pressure[:-1], pressure[1:], np.diff(position)
-    force, square = 0.5 * length @ (one + two), length @ (one**2 + one * two + two**2) / 3.0
+    at_start, two, length = pressure[:-1], pressure[1:], np.diff(position)
+    force, square = 0.5 * length @ (at_start + two), length @ (at_start**2 + at_start * two + two**2) / 3.0
     return PairContact(
         approach=approach,
         peak_pressure=float(pressure.max()),

@@ -80,14 +80,14 @@ def loads_of(planetary_set: PlanetarySet, cycle: MeshCycle, position: int, actin
     acting : sequence of (mesh, gear, side)
         Meshes of the body, whether it is gear 0 or 1 of them, and the flank that they load.
     """
-    found = []
+    columns = []
     for mesh, gear, side in acting:
         pair = mesh_pairs(planetary_set)[int(mesh >= planetary_set.n_planets)]
         for t in np.flatnonzero(cycle.tooth_load[mesh, :, position]):
             zeta = cycle.path[mesh, t, position]
             roll = pair.pitch_roll_1 + zeta if gear == 0 else pair.pitch_roll_2 - pair.sign * zeta
-            found.append((cycle.tooth[gear, mesh, t], side, roll, cycle.tooth_load[mesh, t, position]))
-    tooth, side, roll, force = (np.array(column) for column in zip(*found, strict=True))
+            columns.append((cycle.tooth[gear, mesh, t], side, roll, cycle.tooth_load[mesh, t, position]))
+    tooth, side, roll, force = (np.array(column) for column in zip(*columns, strict=True))
     return ToothLoads(tooth, side, roll, force)
 
 
@@ -137,11 +137,11 @@ def sector_loads(sector: Sector, loads: ToothLoads) -> np.ndarray:
     gear, grid = sector.gear, sector.grid
     result = np.zeros((gear.teeth, 2 * grid.n_nodes))
     for i, tooth in enumerate(loads.tooth):
-        one = replace(loads.only([i]), tooth=np.zeros(1, int))
+        single = replace(loads.only([i]), tooth=np.zeros(1, int))
         name = "flank_left" if loads.side[i] == LEFT else "flank_right"
 
-        def spread(x, normal, one=one):
-            return np.moveaxis(traction(gear, one, x[..., 0], x[..., 1]), 0, -1)
+        def spread(x, normal, single=single):
+            return np.moveaxis(traction(gear, single, x[..., 0], x[..., 1]), 0, -1)
 
         result[tooth % gear.teeth] += edge_load(grid, name, spread, thickness=gear.face_width)
     return result

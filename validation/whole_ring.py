@@ -148,9 +148,9 @@ def free_modes(grid: Grid, material: Material, state: dict[str, str], *, count: 
     mesh, element = to_skfem(grid), ElementTriP3()
     blocks = [0.0, 0.0, 0.0]
     for part, plane in state.items():
-        elements = np.concatenate([own for name, own in grid.regions.items() if name.startswith(part)])
-        own = _elastic(Basis(mesh, element, intorder=4, elements=elements), material, plane)
-        blocks = [block + more for block, more in zip(blocks, own, strict=True)]
+        elements = np.concatenate([of_region for name, of_region in grid.regions.items() if name.startswith(part)])
+        matrices = _elastic(Basis(mesh, element, intorder=4, elements=elements), material, plane)
+        blocks = [block + more for block, more in zip(blocks, matrices, strict=True)]
     basis = Basis(mesh, element, intorder=6)
     inertia = material.density * BilinearForm(lambda u, v, w: u * v).assemble(basis)
     xx, yy, xy = blocks

@@ -24,9 +24,9 @@ def adapt_harmonics(
     """
     reduction, start = reduced(problem), None
     while True:
-        found = solve_harmonic_balance(
+        solution = solve_harmonic_balance(
             problem, frequency, harmonics=harmonics, start=start, reduction=reduction, stability=False
         )
-        if found.tail <= tail or harmonics == max_harmonics or not found.converged:
-            return found
-        harmonics, start = min(2 * harmonics, max_harmonics), found
+        if solution.tail <= tail or harmonics == max_harmonics or not solution.converged:
+            return solution
+        harmonics, start = min(2 * harmonics, max_harmonics), solution

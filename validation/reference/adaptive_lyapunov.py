@@ -34,8 +34,8 @@ def adaptive_exponents(
     chosen, tolerance = LyapunovOptions(**options), checked_tolerance(tolerance)
     frequency = np.atleast_1d(checked_numbers(frequency, "frequency", code="E-RANGE", unit="rad/s"))
     finer, coarser = (
-        _Adaptive(problem, frequency, chosen.steps, chosen.periods, one)
-        for one in (tolerance, min(tolerance * _COARSER, 1e-2))
+        _Adaptive(problem, frequency, chosen.steps, chosen.periods, tolerated)
+        for tolerated in (tolerance, min(tolerance * _COARSER, 1e-2))
     )
     beside = max(2 * PARTS, chosen.points // 4)
     return exponents_of(problem, finer, coarser, checked_start(problem, start), chosen, beside=beside)

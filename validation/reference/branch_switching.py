@@ -77,33 +77,33 @@ def branch_maximum(
     tolerance : float
         Of the verdict, which the solution has where the branch has them.
     """
-    equations, known = branch.equations, branch.curve
+    equations, earlier = branch.equations, branch.curve
     values = np.array([measure(lines) for lines in branch.lines])
     top = int(np.argmax(values))
     parameter, value, solution = float(branch.parameter[top]), float(values[top]), branch.solutions[top]
-    z = np.column_stack([known.points / known.scale, branch.parameter / known.unit])
+    z = np.column_stack([earlier.points / earlier.scale, branch.parameter / earlier.unit])
     curve = _scaled_curve(
         equations.evaluate,
-        known.points[top],
-        known.parameter[top],
+        earlier.points[top],
+        earlier.parameter[top],
         limits=equations.limits,
-        scale=known.scale,
-        unit=known.unit,
+        scale=earlier.scale,
+        unit=earlier.unit,
     )
     for i in {max(top - 1, 0), min(top, len(z) - 2)}:
-        first, last = (correct(curve, z[k], known.tangent[k]) for k in (i, i + 1))
+        first, last = (correct(curve, z[k], earlier.tangent[k]) for k in (i, i + 1))
         segment = Segment(curve, first, last)
 
         def lowered(h: float, segment=segment) -> float:
             u, _ = curve.physical(segment.at(h).z)
             return -measure(equations.balance.lines(u))
 
-        found: OptimizeResult = minimize_scalar(
+        minimum: OptimizeResult = minimize_scalar(
             lowered, bounds=(0.0, segment.length), method="bounded", options={"xatol": 1e-10}
         )  # type: ignore[assignment]
-        if -found.fun > value:
-            u, parameter = curve.physical(segment.at(found.x).z)
-            value, solution = float(-found.fun), equations.solution(u, parameter, 0.0)
+        if -minimum.fun > value:
+            u, parameter = curve.physical(segment.at(minimum.x).z)
+            value, solution = float(-minimum.fun), equations.solution(u, parameter, 0.0)
     if branch.stability:
         solution = equations.judged([parameter], [solution], tolerance)[0]
     return parameter, value, solution
@@ -111,7 +111,7 @@ def branch_maximum(
 
 def switch_branch(
     evaluate: Callable,
-    known: Curve,
+    earlier: Curve,
     index: int,
     *,
     limits,
@@ -124,9 +124,9 @@ def switch_branch(
     ----------
     evaluate : callable
         As given to `continue_curve`.
-    known : Curve
+    earlier : Curve
     index : int
-        Of the branch point among the points of the known curve, one of ``known.branch_points``.
+        Of the branch point among the points of the known curve, one of ``earlier.branch_points``.
     limits, options, describe
         As for `continue_curve`.
 
@@ -137,31 +137,31 @@ def switch_branch(
     ConvergenceError
         The branch point is not simple, so that the other directions cannot be told apart.
     """
-    if index not in known.branch_points:
+    if index not in earlier.branch_points:
         raise CaseError(
             f"point {index} is no branch point",
             code="E-CONVERGENCE",
-            limit=f"one of {known.branch_points.tolist()}",
+            limit=f"one of {earlier.branch_points.tolist()}",
         )
-    start = known.points[index]
+    start = earlier.points[index]
     curve = _scaled_curve(
         evaluate,
         start,
-        known.parameter[index],
+        earlier.parameter[index],
         limits=limits,
-        scale=known.scale,
-        unit=known.unit,
+        scale=earlier.scale,
+        unit=earlier.unit,
         options=options,
         describe=describe,
     )
-    z = curve.scaled(start, known.parameter[index])
+    z = curve.scaled(start, earlier.parameter[index])
     _, derivative = curve.equations(z)
-    point = CurvePoint(z, known.tangent[index], derivative, 0.0, 0, 0.0, float(known.error[index]))
+    point = CurvePoint(z, earlier.tangent[index], derivative, 0.0, 0, 0.0, float(earlier.error[index]))
     try:
         tangent = _crossing_tangent(curve, point)
     except LostError as error:
         raise ConvergenceError(
-            f"no other curve found at {describe(float(known.parameter[index]))}: {error}",
+            f"no other curve found at {describe(float(earlier.parameter[index]))}: {error}",
             code="E-CONVERGENCE",
             remedy="disturb the symmetry of the system a little",
         ) from error
@@ -200,8 +200,8 @@ def _crossing_tangent(curve: ScaledCurve, point: CurvePoint) -> np.ndarray:
     if len(singular) > 1 and singular[-2] < 1e3 * singular[-1]:
         raise LostError(f"no simple branch point: smallest singular values {singular[-2]:.1e}, {singular[-1]:.1e}")
     psi, plane = left[:, -1], right[-2:]
-    known = plane @ point.tangent
-    other = np.array([-known[1], known[0]]) @ plane
+    rates = plane @ point.tangent
+    other = np.array([-rates[1], rates[0]]) @ plane
     other /= np.linalg.norm(other)
     step = 1e-3
 

@@ -146,8 +146,8 @@ def _left_out(system, modes, force):
     n = len(system.M)
     # a column for every degree of freedom: the residual of the columns is that of all motions
     columns = replace(system, W=np.eye(n))
-    known = replace(modes, mesh_stiffness=np.zeros(n), mesh_deflection=modes.shape)
-    return force @ residual_output(columns, known, np.eye(n)).T
+    free_modes = replace(modes, mesh_stiffness=np.zeros(n), mesh_deflection=modes.shape)
+    return force @ residual_output(columns, free_modes, np.eye(n)).T
 
 
 def _condensed(system, stiffness, step, force, start, masters):
@@ -227,8 +227,8 @@ def state_step(mass, damping, stiffness, step: float) -> tuple[np.ndarray, np.nd
     n = len(mass)
     solved = linalg.solve(mass, np.hstack([stiffness, damping, np.eye(n)]), assume_a="pos")
     matrix = np.zeros((4 * n, 4 * n))
-    one = np.eye(n)
-    matrix[:n, n : 2 * n], matrix[2 * n : 3 * n, 3 * n :] = one, one
+    identity = np.eye(n)
+    matrix[:n, n : 2 * n], matrix[2 * n : 3 * n, 3 * n :] = identity, identity
     matrix[n : 2 * n, :n] = -step * step * solved[:, :n]
     matrix[n : 2 * n, n : 2 * n] = -step * solved[:, n : 2 * n]
     matrix[n : 2 * n, 2 * n : 3 * n] = step * step * solved[:, 2 * n :]

@@ -57,8 +57,8 @@ def solve_free_vibration(
         )
     n = len(problem.system.M)
     if not 0 <= fixed < n:
-        told = f"degree of freedom {fixed} fixed"
-        raise CaseError(told, code="E-RANGE", key="fixed", limit=f"0 to {n - 1}")
+        phase_condition = f"degree of freedom {fixed} fixed"
+        raise CaseError(phase_condition, code="E-RANGE", key="fixed", limit=f"0 to {n - 1}")
     if start is None:
         raise CaseError(
             "a free vibration without a start",
@@ -83,15 +83,15 @@ def solve_free_vibration(
         matrix = np.column_stack([(monodromy - np.eye(2 * n))[:, free], slope / moving.rate])
         update = np.linalg.lstsq(matrix, -defect, rcond=SINGULAR)[0]
         y, period = _closer(moving, y, period, free, update, np.abs(defect).max(), integrator)
-    found = _result(moving, y, monodromy, period, chosen, integrator, history)
+    result = _result(moving, y, monodromy, period, chosen, integrator, history)
     # the phase is free, and so is the amplitude of a conservative system
     trivial = 2 if conservative else 1
-    found = _judged(moving, found, chosen, trivial=trivial)
-    if not found.solution.converged:
-        return found
+    result = _judged(moving, result, chosen, trivial=trivial)
+    if not result.solution.converged:
+        return result
     note = f", without {trivial} of phase{' and amplitude' if conservative else ''} that are one"
-    verdict = replace(found.verdict, message=found.verdict.message + note)
-    return replace(found, solution=replace(found.solution, verdict=verdict))
+    verdict = replace(result.verdict, message=result.verdict.message + note)
+    return replace(result, solution=replace(result.solution, verdict=verdict))
 
 
 def _closer(moving: Flow, y, period, free, update, before, options):

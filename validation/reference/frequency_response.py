@@ -267,8 +267,8 @@ def resonance_peaks(frequency, response, *, prominence: float = 0.05) -> tuple[R
             code="E-RANGE",
             limit="finite values over ascending frequencies, as many of both",
         )
-    places, found = find_peaks(size, prominence=0.0)
-    places = places[found["prominences"] >= prominence * size[places]]
+    places, properties = find_peaks(size, prominence=0.0)
+    places = places[properties["prominences"] >= prominence * size[places]]
     return tuple(_peak(f**2, size, int(i)) for i in places)
 
 

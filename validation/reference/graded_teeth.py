@@ -63,15 +63,15 @@ def graded_sector(
     flank = np.asarray(half.curve("flank"))
     if edges is not None:
         flank = _graded(gear, half, roll, half_width, edges, refine, corner)
-    own = [(name, points) for name, points in half.curves if name != "symmetry"]
-    fine = [("contact", flank) if name == "flank" else (name, points) for name, points in own]
-    mirrored = [(name, np.asarray(points)[::-1] * MIRROR) for name, points in own[::-1]]
+    boundary = [(name, points) for name, points in half.curves if name != "symmetry"]
+    fine = [("contact", flank) if name == "flank" else (name, points) for name, points in boundary]
+    mirrored = [(name, np.asarray(points)[::-1] * MIRROR) for name, points in boundary[::-1]]
     if edges is not None and corner is not None and math.isclose(corner, gear.tip_roll, rel_tol=1e-6):
         size = CORNER * half_width / edges
         fine = [(n, _graded_tip(p, gear, size, refine)) if n == "tip" else (n, p) for n, p in fine]
     if side == "right":
         mirrored = [(name, np.asarray(points)[::-1] * MIRROR) for name, points in fine[::-1]]
-        fine = own
+        fine = boundary
     curves = [(_named(name, "left"), points) for name, points in fine]
     curves += [(_named(name, "right"), points) for name, points in mirrored]
     base = np.asarray(half.interfaces[0][1])
@@ -114,8 +114,8 @@ def _graded_tip(tip, gear, size, refine):
     integral = np.concatenate([[0.0], np.cumsum(0.5 * (density[1:] + density[:-1]) * np.diff(s))])
     corners = np.interp(np.linspace(0.0, integral[-1], math.ceil(integral[-1]) + 1), integral, s)
     stations = np.interp(np.arange(2 * len(corners) - 1) / 2, np.arange(len(corners)), corners)
-    found = end - stations / gear.tip_radius
-    points = gear.tip_radius * np.column_stack([np.cos(found), np.sin(found)])
+    depths = end - stations / gear.tip_radius
+    points = gear.tip_radius * np.column_stack([np.cos(depths), np.sin(depths)])
     if abs(angle[0]) < abs(angle[-1]):
         points = points[::-1]
     points[0], points[-1] = tip[0], tip[-1]

@@ -50,8 +50,8 @@ def mac(first, second, mass) -> np.ndarray:
     mass : (n, n) array
     """
     root = np.linalg.cholesky(np.asarray(mass, float)).T
-    one, other = (root @ shape / np.linalg.norm(root @ shape, axis=0) for shape in (first, second))
-    return np.abs(one.conj().T @ other) ** 2
+    lower, other = (root @ shape / np.linalg.norm(root @ shape, axis=0) for shape in (first, second))
+    return np.abs(lower.conj().T @ other) ** 2
 
 
 def approaches(tracked: TrackedModes, mass, *, within: float = 0.1) -> tuple[Approach, ...]:
@@ -68,11 +68,11 @@ def approaches(tracked: TrackedModes, mass, *, within: float = 0.1) -> tuple[App
         Largest distance relative to the frequency.
     """
     f = tracked.eigenvalue.imag / (2.0 * np.pi)
-    found = []
+    approaches = []
     for first in range(f.shape[1]):
         for second in range(first + 1, f.shape[1]):
-            found += _between(tracked, f, mass, first, second, within)
-    return tuple(sorted(found, key=lambda one: one.value))
+            approaches += _between(tracked, f, mass, first, second, within)
+    return tuple(sorted(approaches, key=lambda approach: approach.value))
 
 
 def coupling_factor(first, second, mass, stiffness_change, mass_change=None, *, squared) -> float:
@@ -111,21 +111,21 @@ def _between(tracked: TrackedModes, f, mass, first: int, second: int, within: fl
     mean = 0.5 * (f[:, first] + f[:, second])
     gap, scale = np.abs(difference), np.abs(mean)
     apart = gap > 1e-6 * scale
-    found = []
+    minima = []
     places = np.flatnonzero(apart)
     # signs are compared over the points that are apart, so that a hit on the crossing does not hide it
     for left, right in itertools.pairwise(places):
         if difference[left] * difference[right] < 0.0:
             share = difference[left] / (difference[left] - difference[right])
             at = value[left] + share * (value[right] - value[left])
-            found.append((at, np.interp(share, [0, 1], mean[[left, right]]), 0.0, left, right))
+            minima.append((at, np.interp(share, [0, 1], mean[[left, right]]), 0.0, left, right))
     inner = np.flatnonzero((gap[1:-1] < gap[:-2]) & (gap[1:-1] <= gap[2:]) & apart[1:-1]) + 1
     for i in inner:
         if gap[i] > within * scale[i] or not np.all(difference[i - 1 : i + 2] * difference[i] > 0.0):
             continue
         at, smallest = _vertex(value[i - 1 : i + 2], gap[i - 1 : i + 2])
-        found.append((at, mean[i], smallest, i, i))
-    return [_named(tracked, mass, gap, first, second, *one) for one in found]
+        minima.append((at, mean[i], smallest, i, i))
+    return [_named(tracked, mass, gap, first, second, *minimum) for minimum in minima]
 
 
 def _vertex(value: np.ndarray, gap: np.ndarray) -> tuple[float, float]:

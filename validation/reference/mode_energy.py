@@ -76,7 +76,7 @@ def strain_shares(parts: Mapping[str, tuple[np.ndarray, np.ndarray]], shape) -> 
         bound += np.abs(k) @ (np.abs(columns).T @ np.abs(shape)) ** 2
     total = sum(energy.values())
     strained = np.abs(total) > _UNSTRAINED * bound
-    return {name: np.where(strained, one / np.where(strained, total, 1.0), 0.0) for name, one in energy.items()}
+    return {name: np.where(strained, part / np.where(strained, total, 1.0), 0.0) for name, part in energy.items()}
 
 
 def stiffness_of(parts: Mapping[str, tuple[np.ndarray, np.ndarray]]) -> np.ndarray:

@@ -32,5 +32,5 @@ def _principal(rule: StepRule, ratio) -> np.ndarray:
     matrix = predict + np.array([rule.beta, rule.gamma, 1.0])[:, None] * taken[:, None, :]
     values = np.linalg.eigvals(matrix)
     best = np.argmax(np.where(np.abs(values.imag) > 1e-12, np.abs(values), -1.0), axis=1)
-    found = values[np.arange(len(values)), best]
-    return found.reshape(np.shape(ratio))
+    chosen = values[np.arange(len(values)), best]
+    return chosen.reshape(np.shape(ratio))

@@ -124,8 +124,8 @@ def _free_shapes(grid, rim):
     cuts = []
     for name in ("cut_right", "cut_left"):
         nodes = boundary_nodes(grid, name)
-        found = column[nodes[np.argsort(np.hypot(*grid.points[nodes].T))]].ravel()
-        cuts.append(found[found >= 0])
+        cut_dofs = column[nodes[np.argsort(np.hypot(*grid.points[nodes].T))]].ravel()
+        cuts.append(cut_dofs[cut_dofs >= 0])
     if len(cuts[0]) != len(cuts[1]):
         raise GridError("the two cuts of a sector do not match", code="E-GRID")
     return shapes, *cuts
@@ -202,11 +202,11 @@ def closed_compliance(parts, *, rim: str = "held") -> np.ndarray:
     first = 1
     for k, part in enumerate(parts):
         place = (np.concatenate([k * n + np.arange(n), (k + 1) % count * n + np.arange(n)]),)
-        own = np.append(0, first + np.arange(part.load.shape[1] - 1))
+        columns = np.append(0, first + np.arange(part.load.shape[1] - 1))
         # with a single part both cuts are the same coordinates: the sums must accumulate
         np.add.at(S, np.ix_(place[0], place[0]), part.stiffness)
-        np.add.at(G, np.ix_(place[0], own), part.load)
-        C[np.ix_(own, own)] += part.compliance
+        np.add.at(G, np.ix_(place[0], columns), part.load)
+        C[np.ix_(columns, columns)] += part.compliance
         first += part.load.shape[1] - 1
     if rim == "held":
         H = C + G.T @ np.linalg.solve(S, G)

@@ -120,14 +120,14 @@ def cyclic_support_stiffness(grid, stiffness, count: int, moved, held=()) -> flo
     right, left = cuts
     if len(right) != len(left):
         raise GridError("the two cuts of a sector do not match", code="E-GRID")
-    own = np.setdiff1d(np.arange(2 * grid.n_nodes), np.concatenate([node_dofs(taken), left]))
+    inner = np.setdiff1d(np.arange(2 * grid.n_nodes), np.concatenate([node_dofs(taken), left]))
     place = np.full(2 * grid.n_nodes, -1)
-    place[own] = np.arange(len(own))
+    place[inner] = np.arange(len(inner))
     tie = np.exp(2j * np.pi / count) * cut_rotation(count, len(right))
     row, column = np.nonzero(tie)
-    rows, columns = np.concatenate([own, left[row]]), np.concatenate([place[own], place[right][column]])
-    values = np.concatenate([np.ones(len(own)), tie[row, column]])
-    basis = csc_array((values, (rows, columns)), shape=(2 * grid.n_nodes, len(own)))
+    rows, columns = np.concatenate([inner, left[row]]), np.concatenate([place[inner], place[right][column]])
+    values = np.concatenate([np.ones(len(inner)), tie[row, column]])
+    basis = csc_array((values, (rows, columns)), shape=(2 * grid.n_nodes, len(inner)))
     prescribed = np.zeros(2 * grid.n_nodes, complex)
     prescribed[2 * on], prescribed[2 * on + 1] = 1.0, 1.0j
     K = stiffness.tocsc()

@@ -92,8 +92,8 @@ def _smooth_tangent(H, state: ContactState, index, ends) -> float:
     columns[loaded, 1 + np.arange(len(loaded))] = 1.0
     columns[:, 1 + len(loaded) :] = H[np.ix_(index, beside)]
     half = forward(lower, columns)
-    one, unit, reach = half[:, 0], half[:, 1 : 1 + len(loaded)], half[:, 1 + len(loaded) :]
-    rate, closing = one @ unit, 1.0 - one @ reach
+    under_unit, unit, reach = half[:, 0], half[:, 1 : 1 + len(loaded)], half[:, 1 + len(loaded) :]
+    rate, closing = under_unit @ unit, 1.0 - under_unit @ reach
     # what the slope loses without the last cell, and gains with the next one
     lost = np.where(alone, 0.0, rate**2 / (unit**2).sum(axis=0))
     gained = closing**2 / (H[beside, beside] - (reach**2).sum(axis=0))
@@ -101,4 +101,4 @@ def _smooth_tangent(H, state: ContactState, index, ends) -> float:
     usable = (closing > 0) & (rate > 0) & (come + left > 0)
     share = np.divide(come, come + left, out=np.full(len(come), 0.5), where=usable)
     change = 0.5 * (share * gained - (1.0 - share) * lost)
-    return float(one @ one + change[usable].sum())
+    return float(under_unit @ under_unit + change[usable].sum())

@@ -160,13 +160,13 @@ def torque_rotation(
     options = _Division(edges, refine, flank_elements, force, nearest)
     gears = tuple(_whole_gear(pair, k, options, rim if k == 0 else "held") for k in (0, 1))
     plans = [_near_pairs(pair, fraction, options) for fraction in fractions]
-    outlines = [sector for plan in plans for one in plan for sector in one.sectors]
+    outlines = [sector for plan in plans for gear_plan in plan for sector in gear_plan.sectors]
     grids = iter(mesh_outlines(outlines))
-    found = []
+    meshed_plans = []
     for plan in plans:
-        meshed = [replace(one, grids=(next(grids), next(grids))) for one in plan]
-        found.append(_one_position(pair, gears, meshed, options))
-    deflection, tangent, shares, unknowns, residual = zip(*found, strict=True)
+        meshed = [replace(gear_plan, grids=(next(grids), next(grids))) for gear_plan in plan]
+        meshed_plans.append(_one_position(pair, gears, meshed, options))
+    deflection, tangent, shares, unknowns, residual = zip(*meshed_plans, strict=True)
     return TorqueRotation(
         fractions,
         options.force,

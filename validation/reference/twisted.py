@@ -48,11 +48,11 @@ def section_matrices(grid: Grid, material: Material, twist: float) -> tuple[sp.c
     dofs = (3 * node_of_dof(grid, scalar)[scalar.element_dofs].T[..., None] + np.arange(3)).reshape(m, 18)
     rows, columns = np.repeat(dofs, 18, axis=1).ravel(), np.tile(dofs, (1, 18)).ravel()
     first, second = first.reshape(*first.shape[:3], 18), second.reshape(*second.shape[:3], 18)
-    found = []
-    for one, other in ((first, first), (first, second), (second, second)):
-        local = np.einsum("eqsa,st,eqtb,eq->eab", one, C, other, scalar.dx, optimize=True)
-        found.append(sp.csc_array((local.ravel(), (rows, columns)), shape=(3 * grid.n_nodes,) * 2))
-    return tuple(found)
+    matrices = []
+    for shape, other in ((first, first), (first, second), (second, second)):
+        local = np.einsum("eqsa,st,eqtb,eq->eab", shape, C, other, scalar.dx, optimize=True)
+        matrices.append(sp.csc_array((local.ravel(), (rows, columns)), shape=(3 * grid.n_nodes,) * 2))
+    return tuple(matrices)
 
 
 def _lobatto(order: int) -> tuple[np.ndarray, np.ndarray]:
@@ -70,15 +70,15 @@ def axial_matrices(width: float, elements: int, order: int = 2) -> tuple[np.ndar
     s, w = legendre.leggauss(order + 1)
     value = legendre.legvander(s, order) @ coefficients
     slope = legendre.legval(s, legendre.legder(np.eye(order + 1))).T @ coefficients
-    half, found = 0.5 * width / elements, np.zeros((3, elements * order + 1, elements * order + 1))
+    half, integrals = 0.5 * width / elements, np.zeros((3, elements * order + 1, elements * order + 1))
     first, second = w[:, None] * value, w[:, None] * slope
     parts = np.array([half * value.T @ first, value.T @ second, slope.T @ second / half])
     for start in range(0, elements * order, order):
         at = slice(start, start + order + 1)
-        found[:, at, at] += parts
+        integrals[:, at, at] += parts
     middles = half * (2 * np.arange(elements) + 1 - elements)
     heights = (middles[:, None] + half * nodes[:-1]).ravel()
-    return np.append(heights, 0.5 * width), *found
+    return np.append(heights, 0.5 * width), *integrals
 
 
 def axial_shapes(width: float, elements: int, order: int, z: np.ndarray) -> np.ndarray:
@@ -108,8 +108,10 @@ class Cuts:
 
     def tie(self, angle: float) -> sp.csc_array:
         """Unknowns per unknown of the interior and the right cut, the left one ahead by a phase [rad]."""
-        one = sp.eye_array(self.cut)
-        return sp.csc_array(sp.block_diag([sp.eye_array(self.inner), sp.vstack([one, np.exp(1j * angle) * one])]))
+        identity = sp.eye_array(self.cut)
+        return sp.csc_array(
+            sp.block_diag([sp.eye_array(self.inner), sp.vstack([identity, np.exp(1j * angle) * identity])])
+        )
 
 
 def sector_cuts(grid: Grid, held: str = "rim") -> Cuts:
@@ -144,8 +146,8 @@ def wave_compliances(grid: Grid, material: Material, twist: float, loads, observ
     """Compliance [m^2/N] to waves ``e^(ikz)`` of loads (3n, m), observed (3n, o): (k, phase of a pitch)."""
     cuts = sector_cuts(grid)
     first, mixed, second = section_matrices(grid, material, twist)
-    parts = [cuts.fields.T @ one @ cuts.fields for one in (first, mixed - mixed.T, second)]
-    f, d = (sp.csc_array(cuts.fields.T @ one) for one in (loads, observations))
+    parts = [cuts.fields.T @ wave_part @ cuts.fields for wave_part in (first, mixed - mixed.T, second)]
+    f, d = (sp.csc_array(cuts.fields.T @ columns) for columns in (loads, observations))
     for k, angle in waves:
         tie = cuts.tie(angle)
         held = tie.conj().T
@@ -183,6 +185,6 @@ def _condensed(matrix, columns, inner: int, together: int = 256) -> np.ndarray:
     schur = sp.block_array([[matrix[inner:, inner:], rest], [rest.T, None]]).toarray()
     factor = symmetric_factor(matrix[:inner, :inner], ordering="NATURAL")
     for first in range(0, coupling.shape[1], together):
-        some = slice(first, first + together)
-        schur[:, some] -= coupling.T @ factor.solve(coupling[:, some].toarray())
+        rows = slice(first, first + together)
+        schur[:, rows] -= coupling.T @ factor.solve(coupling[:, rows].toarray())
     return schur

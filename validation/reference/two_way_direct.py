@@ -105,8 +105,8 @@ def direct_forces(
     motion[G:] -= (ring @ to_force[G:].reshape(G * count, size)).reshape(motion[G:].shape)
     still = mean[:, None] * load
     load[G:] -= (ring @ still[G:].ravel()).reshape(G, count)
-    of_meshes = (one[meshes] for one in (excitation.stiffness, excitation.deflection, excitation.force))
-    stiffness, deflection, force = (harmonics_of(one, harmonics[0] * periods) for one in of_meshes)
+    of_meshes = (signal[meshes] for signal in (excitation.stiffness, excitation.deflection, excitation.force))
+    stiffness, deflection, force = (harmonics_of(signal, harmonics[0] * periods) for signal in of_meshes)
     right, matrix = np.empty((2 * G, count), complex), np.array(to_force)
     for j in range(2 * G):
         product = lines.product(stiffness[j])
@@ -136,10 +136,10 @@ def _ring(structure: FixedStructure, paths: MeshPaths, lines: Lines, speed: floa
     at = {int(value): i for i, value in enumerate(number)}
     place = angle + paths.load_angle
     lag = angle - angle[leaders][group]
-    found = np.zeros((len(leaders), len(number), len(leaders), len(number)), complex)
+    coupling = np.zeros((len(leaders), len(number), len(leaders), len(number)), complex)
     for K in np.unique(np.subtract.outer(number, sense * lines.periods * waves)):
-        heard = [(i, at[L]) for i, n in enumerate(waves) if (L := int(K + sense * lines.periods * n)) in at]
-        i, L = (np.array(part) for part in zip(*heard, strict=True))
+        waves_at_order = [(i, at[L]) for i, n in enumerate(waves) if (L := int(K + sense * lines.periods * n)) in at]
+        i, L = (np.array(part) for part in zip(*waves_at_order, strict=True))
         omega, natural = abs(speed) * K / lines.periods, structure.natural_frequency
         modal = 1.0 / (natural**2 - omega**2 + 2j * structure.damping_ratio * natural * omega)
         both = (P[:, i].T * modal) @ P[:, i].conj() + structure.residual[np.ix_(i, i)]
@@ -149,8 +149,8 @@ def _ring(structure: FixedStructure, paths: MeshPaths, lines: Lines, speed: floa
         into = np.exp(1j * (sense * np.outer(lag, number[L] / lines.periods) - np.outer(place, waves[i])))
         into = np.array([into[group == g].sum(axis=0) for g in range(len(leaders))])
         for g, k in np.ndindex(len(leaders), len(leaders)):
-            np.add.at(found[g, :, k], np.ix_(L, L), out[g][:, None] * both * into[k])
-    return found
+            np.add.at(coupling[g, :, k], np.ix_(L, L), out[g][:, None] * both * into[k])
+    return coupling
 
 
 @dataclass(frozen=True)
@@ -215,7 +215,7 @@ def direct_damped_forces(
     size = first + p * count + m * len(reached)
     equations, right = np.zeros((size, size), complex), np.zeros(size, complex)
     signals = (excitation.stiffness, excitation.deflection, excitation.force)
-    stiffness, deflection, force = (harmonics_of(one, harmonics[0] * periods) for one in signals)
+    stiffness, deflection, force = (harmonics_of(signal, harmonics[0] * periods) for signal in signals)
     approach, mean = gears.mesh_deflection, gears.mesh_stiffness
     still, damped = np.outer(gears.load_deflection, number == 0), _Damped.of(matrix, gears, structure)
     omega, turned = abs(speed) * number / periods, abs(speed) * reached / periods
@@ -258,12 +258,12 @@ def direct_damped_forces(
     return lines, np.linalg.solve(equations, right)[:first].reshape(2 * N, count)
 
 
-def farthest_apart(found: TwoWayResponse, speed: int, lines: Lines, force: np.ndarray) -> float:
+def farthest_apart(response: TwoWayResponse, speed: int, lines: Lines, force: np.ndarray) -> float:
     """Largest difference of forces at a speed from two-sided ones (J, n_L), over the largest that fluctuates."""
-    known = np.rint(found.order * found.turns).astype(int)
-    scale = found.turns // lines.periods if lines.periods > 1 else 1
-    expected = np.zeros_like(found.force[speed])
+    orders = np.rint(response.order * response.turns).astype(int)
+    scale = response.turns // lines.periods if lines.periods > 1 else 1
+    expected = np.zeros_like(response.force[speed])
     for L, number in enumerate(lines.number * scale):
         if number >= 0:
-            expected[:, known == number] += np.where(number == 0, 1.0, 2.0) * force[:, [L]]
-    return float(np.abs(found.force[speed] - expected).max() / np.abs(expected[:, known > 0]).max())
+            expected[:, orders == number] += np.where(number == 0, 1.0, 2.0) * force[:, [L]]
+    return float(np.abs(response.force[speed] - expected).max() / np.abs(expected[:, orders > 0]).max())

@@ -149,10 +149,10 @@ def mutant(number: int) -> bytes:
 
 def _replaced(text: str, rng: random.Random, pattern: re.Pattern, make) -> str:
     """Text with one match of a pattern, drawn at random, replaced by ``make(match)``."""
-    found = list(pattern.finditer(text))
-    if not found:
+    matches = list(pattern.finditer(text))
+    if not matches:
         return text
-    match = rng.choice(found)
+    match = rng.choice(matches)
     return text[: match.start()] + make(match) + text[match.end() :]
 
 

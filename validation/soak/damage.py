@@ -56,15 +56,15 @@ def trial(number: int, folder: Path) -> Outcome:
     if target == "grid" and turn % 5:
         target = "journal"  # grids are made anew, which takes a second
     words, read, expected = _MAKERS[target](rng, place, folder)
-    said, found = in_process(read)
+    said, values = in_process(read)
     failure = ""
     if said == "read" and target == "own checksums":
         said = "read, with its own checksum"
     elif said == "read":
-        failure = _difference(found, expected)
+        failure = _difference(values, expected)
         said = "other numbers" if failure else "the same numbers"
     elif not said.startswith("refused"):
-        failure = str(found)
+        failure = str(values)
     if failure:
         failure = f"{target}, {words}: {failure}"
     elif target == "results" and turn % 10 == 0:
@@ -118,12 +118,12 @@ def _called(read: Callable[[], object]) -> tuple[str, object]:
         return "traceback", f"{type(error).__name__}: {str(error)[:200]} ({place_in_package(error)})"
 
 
-def _difference(found: object, expected: object) -> str:
+def _difference(read_values: object, expected: object) -> str:
     """Name what was read and differs, or was not read though nothing was refused."""
-    if not isinstance(found, dict) or not isinstance(expected, dict):
-        return "" if found == expected else "the numbers differ"
-    wrong = [key for key in expected if key not in found or found[key] != expected[key]]
-    wrong += [key for key in found if key not in expected]
+    if not isinstance(read_values, dict) or not isinstance(expected, dict):
+        return "" if read_values == expected else "the numbers differ"
+    wrong = [key for key in expected if key not in read_values or read_values[key] != expected[key]]
+    wrong += [key for key in read_values if key not in expected]
     return f"differ or missing without a word: {', '.join(wrong)}" if wrong else ""
 
 
@@ -193,8 +193,8 @@ def _journal(rng, place, folder):
 
 
 def _grid(rng, place, folder):
-    known, expected = _grid_cache(folder)
-    shutil.copytree(known, place / "grids")
+    intact, expected = _grid_cache(folder)
+    shutil.copytree(intact, place / "grids")
     (path,) = (place / "grids").glob("*.msh")
     words = f"grid {damage_file(path, rng)}"
     return words, lambda: _meshed(place / "grids"), expected
@@ -215,16 +215,16 @@ _MAKERS = {
 def numbers(folder: Path) -> dict[str, str]:
     """Read a results folder: a hash of every stage, of the case, of the manifest without its times."""
     results = open_results(folder)
-    found = {"case": repr(results.case.model_dump()), "convergence": repr(dict(results.manifest.convergence))}
-    found["complete"] = repr(results.manifest.complete)
+    values = {"case": repr(results.case.model_dump()), "convergence": repr(dict(results.manifest.convergence))}
+    values["complete"] = repr(results.manifest.complete)
     for stage in results.stages:
         digest = hashlib.sha256()
         for name, variable in sorted(results[stage].variables.items()):
             digest.update(f"{name} {variable.dims} {variable.attrs} {variable.dtype}".encode())
             text = variable.dtype.kind in "OUS"
             digest.update(repr(variable.values.tolist()).encode() if text else variable.values.tobytes())
-        found[stage] = digest.hexdigest()
-    return found
+        values[stage] = digest.hexdigest()
+    return values
 
 
 @cache
@@ -237,8 +237,8 @@ def _swept(path: Path) -> list:
     case = parse_case(case_texts()["shifts"])
     over = {"planet.profile_shift": [0.0, 0.05, 0.1, 0.15, 2.5], "operation.torque": ["50 N m", "100 N m"]}
     quantities = [named_quantity(name) for name in ("contact ratio sun-planet", "tip thickness planet")]
-    found = sweep(case, over, quantities, journal=path)
-    return [found.values.tobytes(), found.errors]
+    table = sweep(case, over, quantities, journal=path)
+    return [table.values.tobytes(), table.errors]
 
 
 @cache
@@ -349,10 +349,10 @@ def _edited(data: bytes, rng: random.Random) -> tuple[str, bytes]:
             make = lambda old: rng.choice(('"values"', '"key"', '"x"', '""', '"complete"', '"..\\/x"'))  # noqa: E731
         case _:
             return _other_lines(text, rng)
-    found = list(re.finditer(pattern, text))
-    if not found:
+    matches = list(re.finditer(pattern, text))
+    if not matches:
         return _broken(data, rng)
-    match_ = rng.choice(found)
+    match_ = rng.choice(matches)
     new = make(match_[0])
     words = f"{match_[0][:40]} at {match_.start()} now {new[:40]}"
     return words, (text[: match_.start()] + new + text[match_.end() :]).encode()

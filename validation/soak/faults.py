@@ -201,10 +201,10 @@ def few_files(rng: random.Random) -> Fault:
 
 def clock_jumps(rng: random.Random) -> Fault:
     """A clock that jumps, mostly back."""
-    own = random.Random(rng.random())
+    generator = random.Random(rng.random())
 
     def jumping(real):
-        return lambda: real() - own.choice((0.0, 0.0, 3600.0, 1e9, -1e9))
+        return lambda: real() - generator.choice((0.0, 0.0, 3600.0, 1e9, -1e9))
 
     def jump():
         for name in ("time", "perf_counter", "monotonic"):
@@ -231,7 +231,7 @@ def trial(number: int, folder: Path) -> Outcome:
         return _two_processes(number, rng, folder)
     fault = FAULTS[kind](rng)
     name = fault.commands[turn % len(fault.commands)]
-    known, place = undisturbed(name, folder), trial_workspace(name, folder, f"fault {number}")
+    reference, place = undisturbed(name, folder), trial_workspace(name, folder, f"fault {number}")
     before = contents(place / "out") if COMMANDS[name].old else {}
     program = start(
         COMMANDS[name].arguments(place),
@@ -241,8 +241,8 @@ def trial(number: int, folder: Path) -> Outcome:
         environment=fault.environment,
     )
     ended = program.wait()
-    failure = _wrong_end(ended, fault) or _wrong_results(ended, fault, place, before, known.contents, name)
-    failure = failure or _next_run(name, place, known.contents)
+    failure = _wrong_end(ended, fault) or _wrong_results(ended, fault, place, before, reference.contents, name)
+    failure = failure or _next_run(name, place, reference.contents)
     label = FAULTS[kind].__name__.replace("_", " ")
     if not failure:
         _remove(place)
@@ -266,25 +266,25 @@ def _wrong_end(ended: Ended, fault: Fault) -> str:
 
 def _wrong_results(ended: Ended, fault: Fault, place: Path, old: Mapping, new: Mapping, name: str) -> str:
     """What is wrong with the results: they are the new ones, whole, or the old ones as they were."""
-    found = contents(place / "out") if (place / "out").is_dir() else {}
+    files = contents(place / "out") if (place / "out").is_dir() else {}
     if ended.code == 0:
-        wrong = differences(found, new)
+        wrong = differences(files, new)
         return f"ended with 0, {wrong}" if wrong and wrong != "missing: sweep.png" else ""
     if ended.code in fault.ends:  # ended by a library, as by a kill: what it had begun is there beside the old results
-        found = {file: content for file, content in found.items() if not file.startswith(".")}
-    if old and found != old and found != new:
-        return f"ended with {ended.code}, old results: {differences(found, old)}"
+        files = {file: content for file, content in files.items() if not file.startswith(".")}
+    if old and files != old and files != new:
+        return f"ended with {ended.code}, old results: {differences(files, old)}"
     return ""
 
 
 def _next_run(name: str, place: Path, expected: Mapping) -> str:
     """What is wrong with the same command without the fault."""
     ended = start(COMMANDS[name].arguments(place), place).wait()
-    found = contents(place / "out") if (place / "out").is_dir() else {}
+    files = contents(place / "out") if (place / "out").is_dir() else {}
     whole = ended.code == 4 and "--force" in ended.err
     if ended.crash or (ended.code and not whole):
         return f"the next run ended with {ended.code}: {ended.err[-400:]}"
-    if wrong := differences(found, expected):
+    if wrong := differences(files, expected):
         return f"after the next run: {wrong}"
     if rest := left_over(place):
         return f"left over: {', '.join(rest)}"
@@ -294,20 +294,24 @@ def _next_run(name: str, place: Path, expected: Mapping) -> str:
 def _two_processes(number: int, rng: random.Random, folder: Path) -> Outcome:
     """Two processes with one folder: the one writes, the other is refused, and the results are whole."""
     name = rng.choice(("run", "run over old results", "sweep", "optimise", "sweep of gears"))
-    known, place = undisturbed(name, folder), trial_workspace(name, folder, f"fault {number}")
+    reference, place = undisturbed(name, folder), trial_workspace(name, folder, f"fault {number}")
     other = workspace(folder / f"fault {number} other")
     words = COMMANDS[name].arguments(place)
-    one = start(words, place)
-    time.sleep(rng.uniform(0.0, known.seconds))
+    process = start(words, place)
+    time.sleep(rng.uniform(0.0, reference.seconds))
     two = start(words, other)
-    ends = [one.wait(), two.wait()]
+    ends = [process.wait(), two.wait()]
     # the second may begin when the first has ended
     codes = sorted(end.code for end in ends)
     failure = next((end.crash for end in ends if end.crash), "")
     refusals = [end for end in ends if end.code]
     if not failure and (codes not in ([0, 0], [0, 4]) or any(len(end.messages) != 1 for end in refusals)):
         failure = f"ended with {codes}: {[end.err[-300:] for end in ends]}"
-    failure = failure or differences(contents(place / "out"), known.contents) or _next_run(name, place, known.contents)
+    failure = (
+        failure
+        or differences(contents(place / "out"), reference.contents)
+        or _next_run(name, place, reference.contents)
+    )
     if not failure:
         _remove(place)
         _remove(other)

@@ -39,20 +39,20 @@ def trial(number: int, folder: Path) -> Outcome:
     # the first trials, which the tests run, take the quick commands
     names = QUICK if number < 12 else tuple(COMMANDS)
     name, number_of_signal = names[number % len(names)], SIGNALS[number // len(names) % len(SIGNALS)]
-    known = undisturbed(name, folder)
+    reference = undisturbed(name, folder)
     place = trial_workspace(name, folder, f"kill {number}")
     # a few with an interpreter of their own: killed while it loads, or cleans up
     fresh = number >= 12 and rng.random() < 0.2
-    moment = rng.uniform(0.0, known.seconds + (1.5 if fresh else 0.0))
+    moment = rng.uniform(0.0, reference.seconds + (1.5 if fresh else 0.0))
     program = start(COMMANDS[name].arguments(place), place, fresh=fresh)
     time.sleep(moment)
     program.kill(number_of_signal)
     killed = program.wait()
-    failure = _wrong_end(killed, number_of_signal) or _unreadable(place / "out", name, known, folder)
+    failure = _wrong_end(killed, number_of_signal) or _unreadable(place / "out", name, reference, folder)
     done = _finished(place / "out")
     twice = 0
     if not failure:
-        failure, twice = _go_on(name, place, known, done)
+        failure, twice = _go_on(name, place, reference, done)
     said = f"{name}, {signal.Signals(number_of_signal).name}: " + ("ended before" if killed.code == 0 else "killed")
     if failure:
         failure = f"{said} after {moment:.3f} s: {failure}"
@@ -73,23 +73,23 @@ def _wrong_end(killed, number: int) -> str:
     return f"ended with {killed.code}: {killed.err[-500:]}"
 
 
-def _unreadable(out: Path, name: str, known: Undisturbed, folder: Path) -> str:
+def _unreadable(out: Path, name: str, reference: Undisturbed, folder: Path) -> str:
     """What is wrong with the results as a reader finds them after the kill."""
     if not name.startswith("run") or not (out / "manifest.json").is_file():
         return ""
-    wholes = [known.folder, undisturbed("old", folder).folder] if COMMANDS[name].old else [known.folder]
+    wholes = [reference.folder, undisturbed("old", folder).folder] if COMMANDS[name].old else [reference.folder]
     try:
         import warnings
 
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
             results = open_results(out)
-            found = {stage: results[stage] for stage in results.stages}
+            stored = {stage: results[stage] for stage in results.stages}
     except FemgearError:
         return ""
     for whole in wholes:
         expected = open_results(whole / "out")
-        if all(data.identical(expected[stage]) for stage, data in found.items()):
+        if all(data.identical(expected[stage]) for stage, data in stored.items()):
             return ""
     return "the results after the kill are neither the old nor the new ones"
 
@@ -106,7 +106,7 @@ def _finished(out: Path) -> set[str]:
     return stages
 
 
-def _go_on(name: str, place: Path, known: Undisturbed, done: set[str]) -> tuple[str, int]:
+def _go_on(name: str, place: Path, reference: Undisturbed, done: set[str]) -> tuple[str, int]:
     """Run the command again: what is wrong with what it leaves, and how much it computed twice."""
     trace = place / "trace"
     again = start(COMMANDS[name].arguments(place), place, before=lambda: trace_stages(trace)).wait()
@@ -114,14 +114,14 @@ def _go_on(name: str, place: Path, known: Undisturbed, done: set[str]) -> tuple[
     refused = again.code == 4 and "--force" in again.err
     if again.crash or (again.code and not refused):
         return f"again: ended with {again.code}: {again.crash or again.err[-500:]}", 0
-    if wrong := differences(contents(place / "out"), known.contents):
+    if wrong := differences(contents(place / "out"), reference.contents):
         return f"again: {wrong}", 0
     if rest := left_over(place):
         return f"left over: {', '.join(rest)}", 0
     computed = trace.read_text().split() if trace.exists() else []
     twice = sum(stage in done for stage in computed) if name.startswith("run") else 0
     for journal in (place / "out").glob("*.jsonl"):
-        whole = journal_records(known.folder / "out" / journal.name)
+        whole = journal_records(reference.folder / "out" / journal.name)
         twice += max(len(journal_records(journal)) - len(whole), 0)
     return "", twice
 
@@ -137,8 +137,8 @@ def trace_stages(path: Path) -> None:
 
         return solved
 
-    for known in TRAINS:
-        for stage in known.train.stages:
+    for train in TRAINS:
+        for stage in train.train.stages:
             object.__setattr__(stage, "solve", traced(stage.name, stage.solve))
             if stage.parts is not None:
                 object.__setattr__(stage, "parts", traced(stage.name, stage.parts))

@@ -80,13 +80,13 @@ def page(state: State, mutants: str = "") -> str:
     if not state.records:
         return f"{HEAD}\nNothing has run yet.\n\n{KNOWN}"
     last = state.records[-1]["commit"]
-    found = {kind: state.of(kind, last) for kind in KINDS}
-    parts = [HEAD, _summary(state, last, found)]
-    for kind, (records, tally) in found.items():
+    trials = {kind: state.of(kind, last) for kind in KINDS}
+    parts = [HEAD, _summary(state, last, trials)]
+    for kind, (records, tally) in trials.items():
         if records:
             parts.append(_section(kind, tally))
-    failures = [failure for _, tally in found.values() for failure in tally.failures]
-    count = sum(tally.failed for _, tally in found.values())
+    failures = [failure for _, tally in trials.values() for failure in tally.failures]
+    count = sum(tally.failed for _, tally in trials.values())
     parts.append("## Failures\n")
     if count > len(failures):
         parts.append(f"{count} in all, of which {len(failures)} are listed.\n")
@@ -96,9 +96,9 @@ def page(state: State, mutants: str = "") -> str:
     return "\n".join([*parts, KNOWN])
 
 
-def _worst(found: list, digits: int) -> str:
+def _worst(trials: list, digits: int) -> str:
     """The largest value with the number of its trial, nothing where none was measured."""
-    return f"{found[0]:.{digits}f} ({found[1]})" if found[1] >= 0 else ""
+    return f"{trials[0]:.{digits}f} ({trials[1]})" if trials[1] >= 0 else ""
 
 
 def _item(failure: str) -> str:
@@ -107,9 +107,9 @@ def _item(failure: str) -> str:
     return f"* `{' '.join(plain.split())[:300]}`"
 
 
-def _summary(state: State, last: str, found: dict[str, tuple[list[dict], Tally]]) -> str:
+def _summary(state: State, last: str, trials_of_kind: dict[str, tuple[list[dict], Tally]]) -> str:
     """Say what ran, and give a line for every kind."""
-    records = [record for those, _ in found.values() for record in those]
+    records = [record for those, _ in trials_of_kind.values() for record in those]
     hours = sum(record["seconds"] for record in records) / 3600.0
     day = time.strftime("%Y-%m-%d", time.gmtime(max(record["ended"] for record in records)))
     before = [record for record in state.records if record["commit"] != last]
@@ -120,7 +120,7 @@ def _summary(state: State, last: str, found: dict[str, tuple[list[dict], Tally]]
         "| | pieces | trials | failures | most CPU time [s] | most memory [MB] | minutes |",
         "|---|---:|---:|---:|---:|---:|---:|",
     ]
-    for kind, (those, tally) in found.items():
+    for kind, (those, tally) in trials_of_kind.items():
         minutes = sum(record["seconds"] for record in those) / 60.0
         slow, large = _worst(tally.worst_seconds, 2), _worst(tally.worst_megabytes, 0)
         cells = (WORDS[kind][0], len(those), tally.trials, tally.failed, slow, large, f"{minutes:.0f}")

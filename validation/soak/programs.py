@@ -135,8 +135,8 @@ def start(
         if before is not None:
             before()
         if fresh:
-            own = ["-m", "femgear.cli"] if not words[0].endswith(".py") else []
-            os.execv(sys.executable, [sys.executable, *own, *words])
+            prefix = ["-m", "femgear.cli"] if not words[0].endswith(".py") else []
+            os.execv(sys.executable, [sys.executable, *prefix, *words])
         code = _call(words)
         if note_modules:
             Path("modules").write_text("\n".join(sys.modules))
@@ -277,8 +277,8 @@ def undisturbed(name: str, folder: Path) -> Undisturbed:
     """Run a command once, in ``folder``; "old" is the run whose results the others find."""
     command = Command("other chain", _RUN) if name == "old" else COMMANDS[name]
     place = folder / f"undisturbed {name}"
-    for one in _RUN_IMPORTS:
-        importlib.import_module(one)
+    for module in _RUN_IMPORTS:
+        importlib.import_module(module)
     for _ in range(2):
         shutil.rmtree(place, ignore_errors=True)
         workspace(place, command, grids=_grids(name, folder))
@@ -361,12 +361,12 @@ def _plain(value):
     return [_plain(item) for item in value] if isinstance(value, list) else value
 
 
-def differences(found: Mapping[str, str], expected: Mapping[str, str]) -> str:
+def differences(values: Mapping[str, str], expected: Mapping[str, str]) -> str:
     """Name the files that differ, are missing or are too many."""
     parts = {
-        "differ": [name for name in found if name in expected and found[name] != expected[name]],
-        "missing": [name for name in expected if name not in found],
-        "left over": [name for name in found if name not in expected],
+        "differ": [name for name in values if name in expected and values[name] != expected[name]],
+        "missing": [name for name in expected if name not in values],
+        "left over": [name for name in values if name not in expected],
     }
     return "; ".join(f"{words}: {', '.join(names)}" for words, names in parts.items() if names)
 

@@ -16,7 +16,7 @@ _LIMIT = 120.0
 
 def requirements(root: str = "femgear") -> list[str]:
     """List the distributions that one needs, with those that they need, as far as they are installed."""
-    found, seen, pending = {}, set(), [Requirement(root)]
+    requirements, seen, pending = {}, set(), [Requirement(root)]
     while pending:
         wanted = pending.pop()
         key = canonicalize_name(wanted.name), frozenset(wanted.extras)
@@ -27,19 +27,21 @@ def requirements(root: str = "femgear") -> list[str]:
             distribution = metadata.distribution(wanted.name)
         except metadata.PackageNotFoundError:
             continue
-        found[key[0]] = distribution.metadata["Name"]
-        for one in map(Requirement, distribution.requires or ()):
+        requirements[key[0]] = distribution.metadata["Name"]
+        for requirement in map(Requirement, distribution.requires or ()):
             extras = wanted.extras or {""}
-            if one.marker is None or any(one.marker.evaluate({"extra": extra}) for extra in extras):
-                pending.append(one)
-    return sorted(found.values(), key=str.lower)
+            if requirement.marker is None or any(requirement.marker.evaluate({"extra": extra}) for extra in extras):
+                pending.append(requirement)
+    return sorted(requirements.values(), key=str.lower)
 
 
 def licence(name: str) -> str:
     """Say the licence of an installed distribution in a few words, as its metadata do."""
     fields = metadata.metadata(name)
     classified = [
-        one.rsplit(" :: ", 1)[-1] for one in fields.get_all("Classifier") or () if one.startswith("License ::")
+        classifier.rsplit(" :: ", 1)[-1]
+        for classifier in fields.get_all("Classifier") or ()
+        if classifier.startswith("License ::")
     ]
     for words in (fields.json.get("license_expression"), ", ".join(classified), fields.json.get("license")):
         if isinstance(words, str) and words.strip():
@@ -52,14 +54,18 @@ def known_holes() -> str:
     command = [sys.executable, "-m", "pip_audit", "--local", "--progress-spinner", "off", "--format", "json"]
     try:
         done = subprocess.run(command, capture_output=True, text=True, timeout=_LIMIT, check=False)
-        found = json.loads(done.stdout)["dependencies"]
+        dependencies = json.loads(done.stdout)["dependencies"]
     except subprocess.TimeoutExpired:
         return f"known holes: not looked up, no answer within {_LIMIT:g} s"
     except (ValueError, KeyError, TypeError):
         return "known holes: not looked up, " + (done.stderr.strip().splitlines() or ["no answer"])[-1][:200]
-    holes = [f"  {one['name']} {one['version']}: {hole['id']}" for one in found for hole in one.get("vulns", ())]
-    unknown = sum("skip_reason" in one for one in found)
-    words = f"known holes of {len(found) - unknown} packages: {len(holes)}"
+    holes = [
+        f"  {dependency['name']} {dependency['version']}: {hole['id']}"
+        for dependency in dependencies
+        for hole in dependency.get("vulns", ())
+    ]
+    unknown = sum("skip_reason" in dependency for dependency in dependencies)
+    words = f"known holes of {len(dependencies) - unknown} packages: {len(holes)}"
     return "\n".join([words + (f"; {unknown} others could not be looked up" if unknown else ""), *holes])
 
 

@@ -157,5 +157,5 @@ def place_in_package(error: BaseException) -> str:
     """File and line of femgear where an exception was last seen, empty where it never was there."""
     package = Path(femgear.__file__).parent
     frames = traceback.extract_tb(error.__traceback__)
-    own = [frame for frame in frames if Path(frame.filename).is_relative_to(package)]
-    return f"{Path(own[-1].filename).name}:{own[-1].lineno}" if own else ""
+    of_package = [frame for frame in frames if Path(frame.filename).is_relative_to(package)]
+    return f"{Path(of_package[-1].filename).name}:{of_package[-1].lineno}" if of_package else ""

@@ -196,14 +196,14 @@ def netcdf_sizes(base: Path, new: Path) -> Iterator[tuple[str, float | None]]:
     import xarray as xr
 
     options = {"engine": "h5netcdf", "decode_cf": False}
-    with xr.open_dataset(base, **options) as one, xr.open_dataset(new, **options) as other:
-        yield "dimensions", None if dict(one.sizes) == dict(other.sizes) else math.inf
-        yield from attribute_sizes("", one.attrs, other.attrs)
-        for name in {**one.variables, **other.variables}:
-            if name not in one.variables or name not in other.variables:
+    with xr.open_dataset(base, **options) as base_data, xr.open_dataset(new, **options) as other:
+        yield "dimensions", None if dict(base_data.sizes) == dict(other.sizes) else math.inf
+        yield from attribute_sizes("", base_data.attrs, other.attrs)
+        for name in {**base_data.variables, **other.variables}:
+            if name not in base_data.variables or name not in other.variables:
                 yield name, math.inf
                 continue
-            u, v = one.variables[name], other.variables[name]
+            u, v = base_data.variables[name], other.variables[name]
             yield name, array_size(u.values, v.values) if u.dims == v.dims else math.inf
             yield from attribute_sizes(name, u.attrs, v.attrs)
 
@@ -212,22 +212,22 @@ def grid_sizes(base: Path, new: Path) -> Iterator[tuple[str, float | None]]:
     """Size of the difference of points, cells and data of a grid."""
     import pyvista as pv
 
-    found = []
+    texts = []
     for grid in (pv.read(base), pv.read(new)):
         names = ("points", "cells", "celltypes", "faces", "lines", "verts")
         arrays = {name: getattr(grid, name) for name in names if hasattr(grid, name)}
         for kind in ("point_data", "cell_data", "field_data"):
             arrays |= {f"{kind} {name}": array for name, array in getattr(grid, kind).items()}
-        found.append(arrays)
-    one, other = found
-    for name in {**one, **other}:
-        yield name, array_size(one[name], other[name]) if name in one and name in other else math.inf
+        texts.append(arrays)
+    base_text, other = texts
+    for name in {**base_text, **other}:
+        yield name, array_size(base_text[name], other[name]) if name in base_text and name in other else math.inf
 
 
 def table_sizes(base: str, new: str) -> Iterator[tuple[str, float | None]]:
     """Size of the largest difference in every column of a CSV file."""
-    one, other = (list(zip_longest(*csv.reader(io.StringIO(text)))) for text in (base, new))
-    for number, columns in enumerate(zip_longest(one, other, fillvalue=())):
+    base_columns, other = (list(zip_longest(*csv.reader(io.StringIO(text)))) for text in (base, new))
+    for number, columns in enumerate(zip_longest(base_columns, other, fillvalue=())):
         cells = [text_size(*pair) for pair in zip_longest(*columns)]
         differing = [size for size in cells if size is not None]
         yield f"column {number + 1}, {(columns[0] or columns[1])[0]}", max(differing, default=None)
@@ -235,9 +235,9 @@ def table_sizes(base: str, new: str) -> Iterator[tuple[str, float | None]]:
 
 def line_sizes(base: str, new: str) -> Iterator[tuple[str, float | None]]:
     """Size of the difference of every line, lines that are new or gone put aside."""
-    one, other = base.splitlines(), new.splitlines()
-    for _, i, j, k, l in SequenceMatcher(None, one, other, autojunk=False).get_opcodes():
-        for number, pair in enumerate(zip_longest(one[i:j], other[k:l]), i + 1):
+    base_lines, other = base.splitlines(), new.splitlines()
+    for _, i, j, k, l in SequenceMatcher(None, base_lines, other, autojunk=False).get_opcodes():
+        for number, pair in enumerate(zip_longest(base_lines[i:j], other[k:l]), i + 1):
             yield f"line {number}: {pair[0]!r:.150} became {pair[1]!r:.150}", text_size(*pair)
 
 
@@ -247,7 +247,7 @@ def masked(path: Path, paths: list[str]) -> str:
     for place in sorted(paths, key=len, reverse=True):  # one may begin like the other
         text = text.replace(place, f"<path {paths.index(place)}>")
     for mask in MASKS.values():
-        text = re.sub(mask.where, lambda found, mask=mask: re.sub(mask.part, mask.by, found[0]), text)
+        text = re.sub(mask.where, lambda match, mask=mask: re.sub(mask.part, mask.by, match[0]), text)
     return text
 
 
@@ -255,8 +255,8 @@ def same_pixels(base: Path, new: Path) -> bool:
     """Whether all frames of two pictures are equal."""
     from PIL import Image, ImageSequence
 
-    with Image.open(base) as one, Image.open(new) as other:
-        frames = [[np.asarray(f.convert("RGBA")) for f in ImageSequence.Iterator(i)] for i in (one, other)]
+    with Image.open(base) as base_image, Image.open(new) as other:
+        frames = [[np.asarray(f.convert("RGBA")) for f in ImageSequence.Iterator(i)] for i in (base_image, other)]
     return len(frames[0]) == len(frames[1]) and all(map(np.array_equal, *frames))
 
 
@@ -289,10 +289,10 @@ def names_of(folder: Path) -> dict[str, int]:
 
 def compare_folders(base: Path, new: Path, *, tolerance: float, paths: tuple[list[str], list[str]] = ((), ())) -> Tally:
     """Compare all files of two folders; ``paths`` are places of either side that are no difference."""
-    tally, one, other = Tally(tolerance), names_of(base), names_of(new)
-    for name in {**one, **other}:
+    tally, base_names, other = Tally(tolerance), names_of(base), names_of(new)
+    for name in {**base_names, **other}:
         tally.files += 1
-        if name not in one or name not in other:
+        if name not in base_names or name not in other:
             tally.add(f"{name} is missing in the {'base' if name in other else 'new'} outputs", math.inf)
             continue
         try:
@@ -325,7 +325,7 @@ def environment(side: Side, **more: str) -> dict[str, str]:
 @cache
 def libraries() -> str:
     """Hash of the versions of Python and of everything that is installed."""
-    installed = {f"{one.metadata['Name']} {one.version}" for one in metadata.distributions()}
+    installed = {f"{package.metadata['Name']} {package.version}" for package in metadata.distributions()}
     return hashlib.sha256("\n".join([sys.version, *sorted(installed)]).encode()).hexdigest()
 
 
@@ -423,9 +423,9 @@ def side_of(name: str, tree: Path, output: Path) -> Side:
     (folder / "tree").symlink_to(tree)
     command = [sys.executable, "-c", "import femgear; print(femgear.__file__)"]
     options = {"cwd": folder, "env": environment(side), "capture_output": True, "text": True}
-    found = subprocess.run(command, check=True, **options).stdout.strip()
-    if not Path(found).is_relative_to(tree):
-        raise SystemExit(f"{name}: {found} was imported, which is not in {tree}")
+    printed = subprocess.run(command, check=True, **options).stdout.strip()
+    if not Path(printed).is_relative_to(tree):
+        raise SystemExit(f"{name}: {printed} was imported, which is not in {tree}")
     return side
 
 
@@ -459,7 +459,7 @@ def report(sides: tuple[Side, Side], jobs: dict[str, list[bool]], tolerance: flo
         if failed:
             alike = codes[0] == codes[1] and not tally.different
             print(f"    FAILED{' in both checkouts in the same way' if alike else ''}")
-        for size, where in sorted(tally.different, key=lambda found: -found[0])[:WORST]:
+        for size, where in sorted(tally.different, key=lambda difference: -difference[0])[:WORST]:
             print(f"    {size:8.1e}  {where}")
         fine = fine and not tally.different and not failed
     print("pictures: how many have equal pixels, as information; inf: more than numbers differs")
@@ -491,11 +491,14 @@ def main() -> int:
     tree = checkout(given.base_ref, folder, given.new) if given.base_ref else nullcontext(given.base)
     with tree as base_tree:
         sides = side_of("base", base_tree, given.output), side_of("new", given.new, given.output)
-        found = [jobs_of(side.tree) for side in sides]
-        names = [name for name in {**found[0], **found[1]} if not given.only or name in given.only]
+        jobs = [jobs_of(side.tree) for side in sides]
+        names = [name for name in {**jobs[0], **jobs[1]} if not given.only or name in given.only]
         if unknown := set(given.only) - set(names):
             raise SystemExit(f"no case or script of the name {', '.join(sorted(unknown))}")
-        base, new = ([(side, name, own[name]) for name in names if name in own] for side, own in zip(sides, found))
+        base, new = (
+            [(side, name, jobs_of_side[name]) for name in names if name in jobs_of_side]
+            for side, jobs_of_side in zip(sides, jobs)
+        )
 
         def invalid() -> list[tuple[Side, str, list[list[str]]]]:
             return [job for job in base if not is_valid(stored(sides[0], job[1]), sides[0], job[2])]
@@ -505,7 +508,7 @@ def main() -> int:
             compute_all(pending, sides, workers=given.jobs, time_limit=given.time_limit)
         if given.base_only:
             return 1 if invalid() else 0
-        both = {name: [name in own for own in found] for name in names}
+        both = {name: [name in jobs_of_side for jobs_of_side in jobs] for name in names}
         return 0 if report(sides, both, given.tolerance) else 1
 
 

@@ -74,19 +74,19 @@ def sources(folder: Path) -> tuple[Source, ...]:
 
 def refusals(folder: Path = ROOT / "femgear") -> dict[str, list[tuple[str, str, str]]]:
     """Messages, limits and remedies of all refusals by their code, in the order of the source."""
-    found = defaultdict(list)
+    by_code = defaultdict(list)
     for source in sources(folder):
         for call in source.calls:
             words = {word.arg: word.value for word in call.keywords if word.arg}
-            told = [call.args[0] if call.args else None, words.get("limit"), words.get("remedy")]
+            parts = [call.args[0] if call.args else None, words.get("limit"), words.get("remedy")]
             for code in _codes(words.get("code")):
                 within = [function for function in source.functions if _holds(function, call)]
-                values = [_values(one, call, within[-1] if within else source.tree) for one in told]
-                for cells in zip(*(one * (len(max(values, key=len)) // len(one)) for one in values)):
+                values = [_values(part, call, within[-1] if within else source.tree) for part in parts]
+                for cells in zip(*(column * (len(max(values, key=len)) // len(column)) for column in values)):
                     entry = tuple(_text(cell) for cell in cells)
-                    if entry not in found[code]:
-                        found[code].append(entry)
-    return dict(found)
+                    if entry not in by_code[code]:
+                        by_code[code].append(entry)
+    return dict(by_code)
 
 
 def _holds(function: ast.FunctionDef, call: ast.Call) -> bool:
@@ -106,14 +106,14 @@ def _values(node: ast.expr | None, use: ast.Call, scope: ast.AST) -> Sequence[as
 @cache
 def _assignments(statement: ast.stmt) -> list[tuple[str, ast.expr]]:
     """Names and values of all assignments within a statement, in the order of the source."""
-    found = []
+    calls = []
     for part in ast.walk(statement):
         if isinstance(part, ast.Assign):
             target, value = part.targets[0], part.value
             both = isinstance(target, ast.Tuple) and isinstance(value, ast.Tuple)
             pairs = zip(target.elts, value.elts) if both else [(target, value)]
-            found += [(part.lineno, _name(t), v) for t, v in pairs]
-    return [(name, value) for _, name, value in sorted(found, key=lambda entry: entry[0])]
+            calls += [(part.lineno, _name(t), v) for t, v in pairs]
+    return [(name, value) for _, name, value in sorted(calls, key=lambda entry: entry[0])]
 
 
 def _before(scope: ast.AST, use: ast.Call) -> Iterator[ast.stmt]:
@@ -127,15 +127,15 @@ def _before(scope: ast.AST, use: ast.Call) -> Iterator[ast.stmt]:
 
 def warnings(folder: Path = ROOT / "femgear") -> list[tuple[str, str, str, str]]:
     """Codes, entries of the case, messages and remedies of all warnings, by code."""
-    found = set()
+    texts = set()
     for source in sources(folder):
         for function in source.functions:
             for call in source.calls_in(function):
                 if call.args and _name(call.func) == "Finding" and _text(call.args[0])[:2] == "W-":
                     remedy = next((word.value for word in call.keywords if word.arg == "remedy"), None)
                     cells = [*call.args[:3], call.args[3] if len(call.args) > 3 else remedy]
-                    found.add(tuple(_text(_assigned(cell, call, function)) for cell in cells))
-    return sorted(found)
+                    texts.add(tuple(_text(_assigned(cell, call, function)) for cell in cells))
+    return sorted(texts)
 
 
 def _assigned(node: ast.expr | None, use: ast.Call, function: ast.FunctionDef) -> ast.expr | None:
@@ -143,11 +143,13 @@ def _assigned(node: ast.expr | None, use: ast.Call, function: ast.FunctionDef) -
     if not isinstance(node, ast.Name):
         return node
     values = [
-        one
-        for one in ast.walk(function)
-        if isinstance(one, ast.Assign) and ast.unparse(one.targets[0]) == node.id and one.lineno < use.lineno
+        assignment
+        for assignment in ast.walk(function)
+        if isinstance(assignment, ast.Assign)
+        and ast.unparse(assignment.targets[0]) == node.id
+        and assignment.lineno < use.lineno
     ]
-    return max(values, key=lambda one: one.lineno).value if values else node
+    return max(values, key=lambda assignment: assignment.lineno).value if values else node
 
 
 def named_codes(folder: Path = ROOT / "femgear") -> set[str]:
@@ -186,20 +188,20 @@ def _text(node: ast.expr | None) -> str:
 
 def page(meanings: dict[str, str]) -> str:
     """Text of docs/errors.md."""
-    found, parts = refusals(), [HEAD]
+    by_code, parts = refusals(), [HEAD]
     for code in sorted(meanings):
         parts.append(f"## {code}\n\n{meanings[code]}\n")
-        rows = [row for row in found.get(code, []) if row[0].strip("… :")]
+        rows = [row for row in by_code.get(code, []) if row[0].strip("… :")]
         if rows:
             cells = (" | ".join(_cell(text) for text in row) for row in rows)
             table = "\n".join(f"| {row} |" for row in cells)
             parts.append(f"| message | allowed | remedy |\n|---|---|---|\n{table}\n")
     rows = "\n".join(f"| {' | '.join(map(_cell, row))} |" for row in warnings())
-    known = "\n".join(
+    warning_rows = "\n".join(
         f"| {code} | {meaning.severity} | {_cell(meaning.sentence)} | {_cell(meaning.advice)} |"
         for code, meaning in CATALOGUE.items()
     )
-    return "\n".join([*parts, f"{WARNINGS.format(meanings=known)}\n{rows}\n"])
+    return "\n".join([*parts, f"{WARNINGS.format(meanings=warning_rows)}\n{rows}\n"])
 
 
 def _cell(text: str) -> str:

@@ -37,9 +37,9 @@ def help_texts(text: str) -> Iterator[tuple[str, str]]:
                 header, of = cells, re.findall(r"`\[(\w+)\]`", cells[0])
                 tables = of or tables
             elif header and not set(cells[0]) <= set("-: "):
-                told = plain(cells[header.index("value")]) if "value" in header else ""
+                choices = plain(cells[header.index("value")]) if "value" in header else ""
                 default = plain(cells[header.index("default")]) if "default" in header else ""
-                words = f"{told}{'. Default: ' if told and default else 'Default: ' if default else ''}{default}"
+                words = f"{choices}{'. Default: ' if choices and default else 'Default: ' if default else ''}{default}"
                 within = cells[header.index("of")] if "of" in header else "all"
                 for name in re.findall(r"`([a-z_0-9.]+)`", cells[0]) if words else ():
                     for table in tables or [""]:
@@ -49,14 +49,14 @@ def help_texts(text: str) -> Iterator[tuple[str, str]]:
             header = header if line.strip() else []
 
 
-def gearbox_texts(text: str, known: Container[str]) -> Iterator[tuple[str, str]]:
+def gearbox_texts(text: str, written: Container[str]) -> Iterator[tuple[str, str]]:
     """Read what the tables of keys say of entries of a gearbox, but for those that are ``known`` by their last names.
 
     Names have three parts at most, as many as the form looks for.
     """
     for (path, key), meaning in meanings_on(text).items():
         parts = f"{path}.{key}".split(".")
-        if path and ".".join(parts[-2:]) not in known:
+        if path and ".".join(parts[-2:]) not in written:
             yield ".".join(parts[-3:]), plain(meaning)
 
 

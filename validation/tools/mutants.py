@@ -101,7 +101,7 @@ def replacements(node: Any, place: str = "") -> Iterator[tuple[str, ast.AST]]:
             yield "constant", ast.Constant(value + 1 if value in (0, 1) else 2 * value)
         case ast.Compare(left, [op], [right]):
             yield "comparison", ast.Compare(left, [OPPOSITE[type(op)]()], [right])
-            if type(op) in EDGE and any(_is_integer(one) for one in (left, right)):
+            if type(op) in EDGE and any(_is_integer(compared) for compared in (left, right)):
                 yield "comparison", ast.Compare(left, [EDGE[type(op)]()], [right])
         case ast.Compare(left, ops, right):
             for i, op in enumerate(ops):
@@ -205,15 +205,15 @@ def _place(parent: ast.AST, field: str, place: str) -> str:
 
 def mutants(module: str, source: str) -> list[Mutant]:
     """All mutants of a module, at most two of a kind on a line."""
-    found, seen = [], defaultdict(int)
+    drawn_sites, seen = [], defaultdict(int)
     for number, site in enumerate(sites(ast.parse(source))):
         line = site.node.lineno
         seen[line, site.kind] += 1
         if seen[line, site.kind] <= 2:
-            before, after = (" ".join(ast.unparse(one).split()) for one in (site.node, site.new))
+            before, after = (" ".join(ast.unparse(tree).split()) for tree in (site.node, site.new))
             lines = (site.statement.lineno, site.node.end_lineno)
-            found.append(Mutant(module, number, site.kind, line, lines, site.function, before, after))
-    return found
+            drawn_sites.append(Mutant(module, number, site.kind, line, lines, site.function, before, after))
+    return drawn_sites
 
 
 def mutated(source: str, number: int) -> ast.Module:
@@ -227,15 +227,15 @@ def mutated(source: str, number: int) -> ast.Module:
     return tree
 
 
-def drawn(found: Sequence[Mutant], count: int, seed: int) -> list[Mutant]:
+def drawn(mutants_of_module: Sequence[Mutant], count: int, seed: int) -> list[Mutant]:
     """The first mutants of a random order, a third of them signs: more of them begin with the same ones."""
-    module = found[0].module if found else ""
-    order = sorted(found, key=lambda one: one.number)
+    module = mutants_of_module[0].module if mutants_of_module else ""
+    order = sorted(mutants_of_module, key=lambda mutant: mutant.number)
     random.Random(f"{seed} {module}").shuffle(order)
-    signs = [one for one in order if one.kind == "sign"]
-    others = [one for one in order if one.kind != "sign"]
+    signs = [mutant for mutant in order if mutant.kind == "sign"]
+    others = [mutant for mutant in order if mutant.kind != "sign"]
     picked = []
-    while len(picked) < min(count, len(found)):
+    while len(picked) < min(count, len(mutants_of_module)):
         picked += signs[:1] + others[:2]
         signs, others = signs[1:], others[2:]
     return picked[:count]
@@ -243,11 +243,11 @@ def drawn(found: Sequence[Mutant], count: int, seed: int) -> list[Mutant]:
 
 def modules(names: Sequence[str]) -> list[str]:
     """Modules of the package by names of files or folders, relative to it."""
-    package, found = ROOT / "femgear", []
+    package, module_names = ROOT / "femgear", []
     for name in names:
         path = package / name.removesuffix(".py")
         below = sorted(path.rglob("*.py")) if path.is_dir() else [path.with_suffix(".py")]
         if not below or not below[0].exists():
             raise SystemExit(f"--modules {name}: femgear has no such module or folder")
-        found += [str(one.relative_to(package)) for one in below if one.name != "__init__.py"]
-    return list(dict.fromkeys(found))
+        module_names += [str(module.relative_to(package)) for module in below if module.name != "__init__.py"]
+    return list(dict.fromkeys(module_names))

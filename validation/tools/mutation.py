@@ -106,7 +106,7 @@ class Watch:
     @pytest.hookimpl(tryfirst=True)
     def pytest_collection_modifyitems(self, items):
         if (order := self.order) is not None:
-            items[:] = sorted((one for one in items if one.nodeid in order), key=lambda one: order[one.nodeid])
+            items[:] = sorted((item for item in items if item.nodeid in order), key=lambda item: order[item.nodeid])
 
     def pytest_runtest_protocol(self, item):
         if self.order is not None:
@@ -227,8 +227,8 @@ class LineMap:
     def __init__(self, folder: Path, tests: Sequence[str]):
         self.folder = folder
         self.package = _digest(*sorted((ROOT / "femgear").rglob("*.py")))
-        found = (path for name in tests for path in sorted((ROOT / name).rglob("test_*.py")) or [ROOT / name])
-        self.files = list(dict.fromkeys(str(path.relative_to(ROOT)) for path in found))
+        paths = (path for name in tests for path in sorted((ROOT / name).rglob("test_*.py")) or [ROOT / name])
+        self.files = list(dict.fromkeys(str(path.relative_to(ROOT)) for path in paths))
         self.digests = {name: _digest(ROOT / name) for name in self.files}
         self.seconds: dict[str, float] = {}
         self._lines: dict[str, dict[int, list[str]]] = {}
@@ -303,8 +303,8 @@ class LineMap:
         """
         mirror, stem = "tests/" + str(Path(module).parent) + "/", Path(module).stem
         near = [test for test in covering if test.startswith(mirror)]
-        known = [test for test, _ in killers.most_common() if test in covering][:PROVEN]
-        yield self._ordered(self._within(known, 0.3 * budget), stem)
+        likeliest = [test for test, _ in killers.most_common() if test in covering][:PROVEN]
+        yield self._ordered(self._within(likeliest, 0.3 * budget), stem)
         first = self._within(near, 0.5 * budget)
         yield self._ordered(first, stem)
         yield self._ordered(self._within(set(covering) - set(near), budget), stem)
@@ -319,19 +319,19 @@ class LineMap:
             name = test.split("[")[0]
             ranked.append((name in seen, self.seconds[test], test))
             seen.add(name)
-        found = []
+        killed = []
         for _, seconds, test in sorted(ranked):
             budget -= seconds
-            if budget < 0 and found:
+            if budget < 0 and killed:
                 break
-            found.append(test)
-        return found
+            killed.append(test)
+        return killed
 
     def _ordered(self, tests: Sequence[str], stem: str) -> list[str]:
         files = defaultdict(list)
         for test in sorted(tests, key=lambda test: (self.seconds[test], test)):
             files[test.split("::")[0]].append(test)
-        cost = {name: sum(self.seconds[test] for test in own) for name, own in files.items()}
+        cost = {name: sum(self.seconds[test] for test in covering_tests) for name, covering_tests in files.items()}
         names = sorted(files, key=lambda name: (stem not in name, cost[name]))
         return [test for name in names for test in files[name]]
 
@@ -410,14 +410,14 @@ class Campaign:
     """Results of mutants by the digest of their file, one line of JSON each: the last one counts."""
 
     def __init__(self, path: Path, lines: LineMap, reasons: dict):
-        self.path, self.lines, self.known, self.reasons = path, lines, {}, reasons
+        self.path, self.lines, self.outcomes, self.reasons = path, lines, {}, reasons
         self.killers: dict[str, Counter[str]] = defaultdict(Counter)
         if path.exists():
             for line in path.read_text(encoding="utf-8").splitlines():
                 # a campaign that was stopped may have left half a line
                 with contextlib.suppress(ValueError, KeyError):
                     entry = json.loads(line)
-                    self.known[entry["file"], entry["number"]] = entry
+                    self.outcomes[entry["file"], entry["number"]] = entry
                     self.killers[entry["place"].split(":")[0]].update([entry.get("killer", "")])
 
     def state(self, mutant: Mutant, covering: Sequence[str]) -> str:
@@ -429,40 +429,40 @@ class Campaign:
 
     def run(self, chosen: Sequence[Mutant], jobs: int, budget: float, folder: Path) -> dict[Mutant, dict]:
         """Meet mutants without a result, and those that survived fewer or older tests for no known reason."""
-        files = {one.module: _digest(ROOT / "femgear" / one.module) for one in chosen}
+        files = {mutant.module: _digest(ROOT / "femgear" / mutant.module) for mutant in chosen}
         results, work = {}, []
-        for one in chosen:
-            covering = self.lines.covering(one.module, one.lines)
-            key = {"file": files[one.module], "number": one.number, "tests": self.state(one, covering)}
+        for mutant in chosen:
+            covering = self.lines.covering(mutant.module, mutant.lines)
+            key = {"file": files[mutant.module], "number": mutant.number, "tests": self.state(mutant, covering)}
             key |= {"covering": len(covering), "budget": budget}
-            known = self.known.get((key["file"], key["number"]))
-            same = known and known["tests"] == key["tests"] and known.get("budget", 0.0) >= budget
-            settled = known and (known["outcome"] != "survived" or same)
-            if settled or (known and one.name in self.reasons):
-                results[one] = known
+            outcome = self.outcomes.get((key["file"], key["number"]))
+            same = outcome and outcome["tests"] == key["tests"] and outcome.get("budget", 0.0) >= budget
+            settled = outcome and (outcome["outcome"] != "survived" or same)
+            if settled or (outcome and mutant.name in self.reasons):
+                results[mutant] = outcome
             elif not covering:
-                results[one] = key | {"outcome": "survived", "ran": 0, "seconds": 0.0}
+                results[mutant] = key | {"outcome": "survived", "ran": 0, "seconds": 0.0}
             else:
 
-                def task(place, one=one, covering=covering):
-                    return meet(one, self.lines, covering, budget, self.killers[one.module], place)
+                def task(place, mutant=mutant, covering=covering):
+                    return meet(mutant, self.lines, covering, budget, self.killers[mutant.module], place)
 
-                work.append(((one, key), task))
+                work.append(((mutant, key), task))
         self.path.parent.mkdir(parents=True, exist_ok=True)
         with self.path.open("a", encoding="utf-8") as stream:
-            for (one, key), result, seconds in run_all(work, jobs, folder):
+            for (mutant, key), result, seconds in run_all(work, jobs, folder):
                 entry = key | _verdict(result) | {"seconds": round(seconds, 2)}
-                entry |= {"place": one.place, "kind": one.kind, "change": one.change}
-                results[one] = entry
-                self.killers[one.module].update([entry.get("killer", "")])
+                entry |= {"place": mutant.place, "kind": mutant.kind, "change": mutant.change}
+                results[mutant] = entry
+                self.killers[mutant.module].update([entry.get("killer", "")])
                 stream.write(json.dumps(entry) + "\n")
                 stream.flush()
                 by = entry.get("killer", f"{entry['ran']} of {entry['covering']} tests")
                 print(
-                    f"{one.place} {one.kind}: {one.change}: {entry['outcome']} ({by}) {seconds:.1f} s",
+                    f"{mutant.place} {mutant.kind}: {mutant.change}: {entry['outcome']} ({by}) {seconds:.1f} s",
                     flush=True,
                 )
-        return {one: results[one] for one in chosen}
+        return {mutant: results[mutant] for mutant in chosen}
 
 
 def _verdict(result: dict) -> dict:
@@ -470,10 +470,10 @@ def _verdict(result: dict) -> dict:
         return {"outcome": "timeout", "ran": 0, "killer": f"time limit: {result['timeout']}"}
     if "crash" in result:
         return {"outcome": "killed", "ran": 0, "killer": f"crash: {result['crash']}"}
-    found = result["result"]
-    if found["killer"]:
-        return {"outcome": "killed", **found}
-    return {"outcome": "survived", "ran": found["ran"]}
+    record = result["result"]
+    if record["killer"]:
+        return {"outcome": "killed", **record}
+    return {"outcome": "survived", "ran": record["ran"]}
 
 
 # --------------------------------------------------------------------------------------------- the report
@@ -500,15 +500,15 @@ def _commit() -> str:
 def report(results: dict[Mutant, dict], reasons: dict, seed: int) -> tuple[str, bool]:
     """A page of scores by module, survivors and equivalents; and whether the aims are met."""
 
-    def reason(one: Mutant) -> str:
-        return reasons.get(one.name, "")
+    def reason(mutant: Mutant) -> str:
+        return reasons.get(mutant.name, "")
 
     def row(name: str, ones: Sequence[Mutant]) -> str:
-        same = [one for one in ones if results[one]["outcome"] == "survived" and reason(one)]
-        real = [one for one in ones if one not in same]
-        dead = [one for one in real if results[one]["outcome"] != "survived"]
-        late = sum(results[one]["outcome"] == "timeout" for one in ones)
-        signs = [sum(one.kind == "sign" for one in some) for some in (dead, real)]
+        same = [mutant for mutant in ones if results[mutant]["outcome"] == "survived" and reason(mutant)]
+        real = [mutant for mutant in ones if mutant not in same]
+        dead = [mutant for mutant in real if results[mutant]["outcome"] != "survived"]
+        late = sum(results[mutant]["outcome"] == "timeout" for mutant in ones)
+        signs = [sum(mutant.kind == "sign" for mutant in group) for group in (dead, real)]
         score = f"{100 * len(dead) / len(real):.0f} %" if real else ""
         left = len(real) - len(dead)
         cells = (name, len(ones), len(dead), late, len(same), left, score, f"{signs[0]}/{signs[1]}")
@@ -517,8 +517,8 @@ def report(results: dict[Mutant, dict], reasons: dict, seed: int) -> tuple[str, 
 
     scores = {}
     by_module = defaultdict(list)
-    for one in results:
-        by_module[one.module].append(one)
+    for mutant in results:
+        by_module[mutant.module].append(mutant)
     head = "module | mutants | killed | by time limit | equivalent | survived | score | sign flips killed"
     page = [
         "# Mutants",
@@ -530,16 +530,18 @@ def report(results: dict[Mutant, dict], reasons: dict, seed: int) -> tuple[str, 
     page += [f"| {head} |", "|" + "---|" * 8]
     page += [row(name, ones) for name, ones in sorted(by_module.items())]
     page += [row("**all**", list(results)), "", "## Survivors", ""]
-    left = [one for one in results if results[one]["outcome"] == "survived" and not reason(one)]
-    for one in sorted(left, key=lambda one: (one.kind != "sign", one.module, one.line)):
-        entry = results[one]
+    left = [mutant for mutant in results if results[mutant]["outcome"] == "survived" and not reason(mutant)]
+    for mutant in sorted(left, key=lambda mutant: (mutant.kind != "sign", mutant.module, mutant.line)):
+        entry = results[mutant]
         ran = f"{entry['ran']} tests pass, {entry['covering']} run the line, {entry['seconds']:.0f} s"
         why = ran if entry["covering"] else "no test runs the line"
-        page.append(f"* {one.place} {one.kind} in `{one.function}`: `{one.before}` -> `{one.after}`: {why}")
+        page.append(
+            f"* {mutant.place} {mutant.kind} in `{mutant.function}`: `{mutant.before}` -> `{mutant.after}`: {why}"
+        )
     page += ["" if left else "None.", "## Equivalent", ""]
-    for one in results:
-        if results[one]["outcome"] == "survived" and reason(one):
-            page.append(f"* {one.place} `{one.before}` -> `{one.after}`: {reason(one)}")
+    for mutant in results:
+        if results[mutant]["outcome"] == "survived" and reason(mutant):
+            page.append(f"* {mutant.place} `{mutant.before}` -> `{mutant.after}`: {reason(mutant)}")
     spent = [entry["seconds"] for entry in results.values()]
     page += ["", f"{sum(spent) / max(len(spent), 1):.1f} s of CPU time a mutant.", ""]
     dead, real, signs = scores["**all**"]
@@ -561,8 +563,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     chosen = []
     for module in modules(given.modules):
         source = (ROOT / "femgear" / module).read_text(encoding="utf-8")
-        found = [one for one in mutants(module, source) if not given.kinds or one.kind in given.kinds]
-        chosen += drawn(found, given.count, given.seed)
+        drawn_mutants = [mutant for mutant in mutants(module, source) if not given.kinds or mutant.kind in given.kinds]
+        chosen += drawn(drawn_mutants, given.count, given.seed)
     sys.path.insert(0, str(ROOT))
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(143))  # and end the processes started here
     preload()

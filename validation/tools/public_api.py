@@ -21,16 +21,16 @@ def lines() -> list[str]:
     """Write the names of the packages with their homes, then the signature of every home, sorted."""
     offered = dict(name for package in PACKAGES for name in _offered(package))
     homes = {*offered.values()} | {name for name in documented() if name not in offered}
-    known = [f"{name} = {home}" for name, home in sorted(offered.items())]
-    return known + [one for home in sorted(homes) for one in _signatures(*home.rsplit(".", 1))]
+    constants = [f"{name} = {home}" for name, home in sorted(offered.items())]
+    return constants + [line for home in sorted(homes) for line in _signatures(*home.rsplit(".", 1))]
 
 
 def documented() -> set[str]:
     """Find the names that README, docs and examples import."""
     paths = (ROOT / "README.md", *ROOT.glob("docs/**/*.md"), *ROOT.glob("scripts/examples/*.py"))
     text = "\n".join(path.read_text(encoding="utf-8") for path in paths)
-    found = re.findall(r"(?m)^\s*from (femgear[\w.]*) import (\([^)]*\)|.*)$", text)
-    return {f"{module}.{name}" for module, names in found for name in re.findall(r"\w+", names)}
+    imports = re.findall(r"(?m)^\s*from (femgear[\w.]*) import (\([^)]*\)|.*)$", text)
+    return {f"{module}.{name}" for module, names in imports for name in re.findall(r"\w+", names)}
 
 
 @cache
@@ -44,7 +44,7 @@ def _offered(package: str) -> Iterator[tuple[str, str]]:
     """Names that a package takes from its modules, those for type checkers among them, with their homes."""
     for node in ast.walk(_tree(package)):
         if isinstance(node, ast.ImportFrom) and str(node.module).startswith("femgear."):
-            yield from ((f"{package}.{one.name}", f"{node.module}.{one.name}") for one in node.names)
+            yield from ((f"{package}.{alias.name}", f"{node.module}.{alias.name}") for alias in node.names)
 
 
 def _signatures(module: str, name: str) -> list[str]:
@@ -53,11 +53,11 @@ def _signatures(module: str, name: str) -> list[str]:
         if isinstance(node, ast.FunctionDef) and node.name == name:
             return [f"{module}.{_function(node)}"]
         if isinstance(node, ast.ClassDef) and node.name == name:
-            fields = (ast.unparse(one) for one in node.body if isinstance(one, ast.AnnAssign))
+            fields = (ast.unparse(annotated) for annotated in node.body if isinstance(annotated, ast.AnnAssign))
             shown = ", ".join(field for field in fields if not field.startswith("_"))
-            methods = (one for one in node.body if isinstance(one, ast.FunctionDef))
-            public = (one for one in methods if one.name == "__init__" or one.name[0] != "_")
-            return [f"{module}.{name}({shown})", *(f"{module}.{name}.{_function(one)}" for one in public)]
+            methods = (method for method in node.body if isinstance(method, ast.FunctionDef))
+            public = (method for method in methods if method.name == "__init__" or method.name[0] != "_")
+            return [f"{module}.{name}({shown})", *(f"{module}.{name}.{_function(method)}" for method in public)]
     return [f"{module}.{name}"]
 
 

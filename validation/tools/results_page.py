@@ -114,20 +114,22 @@ def variables() -> dict[tuple[str, str], Variables]:
     """Variables of every file by train and stage."""
     static = STATIC_VARIABLES | PEAK_VARIABLES | SLICE_VARIABLES | HELIX_VARIABLES
     declared = {"static": static, "stress": STRESS_VARIABLES}
-    found: dict[tuple[str, str], Variables] = {("elastic", stage): one for stage, one in declared.items()}
+    variables_of: dict[tuple[str, str], Variables] = {
+        ("elastic", stage): of_stage for stage, of_stage in declared.items()
+    }
     for train, (name, changes) in RUNS.items():
         case = with_values(femgear.read_case(ROOT / "cases" / f"{name}.toml"), changes)
         for stage, result in femgear.solve(case).items():
             if stage not in declared and stage in SHOWN.get(train, (stage,)):
-                found[train, stage] = {
+                variables_of[train, stage] = {
                     name: (
-                        " ".join(one.dims),
-                        "" if one.dtype.kind in "OUS" else one.attrs["units"],
-                        one.attrs["long_name"],
+                        " ".join(variable.dims),
+                        "" if variable.dtype.kind in "OUS" else variable.attrs["units"],
+                        variable.attrs["long_name"],
                     )
-                    for name, one in result.dataset().data_vars.items()
+                    for name, variable in result.dataset().data_vars.items()
                 }
-    return found
+    return variables_of
 
 
 def table(entries: Variables, remarks: Mapping[str, str]) -> str:
@@ -151,16 +153,16 @@ def table(entries: Variables, remarks: Mapping[str, str]) -> str:
     return HEAD + "".join(line.replace("|  |", "| |") for line in lines)
 
 
-def page(text: str, found: Mapping[tuple[str, str], Variables]) -> str:
+def page(text: str, variables_of: Mapping[tuple[str, str], Variables]) -> str:
     """Text of the page with its tables written anew; each of them must be there, once."""
     places = [match[1:3] for match in TABLE.findall(text)]
-    if sorted(places) != sorted(found):
-        wrong = sorted(set(found) ^ set(places)) or places
+    if sorted(places) != sorted(variables_of):
+        wrong = sorted(set(variables_of) ^ set(places)) or places
         raise SystemExit(f"tables that are missing, unknown or given twice: {wrong}")
 
     def written(match: re.Match) -> str:
         rows = re.findall(r"(?m)^\| `(\w+)`.*\|(?: (.*))? \|$", match[0])
-        return f"{match[1]}{table(found[match[2], match[3]], dict(rows))}{match[4]}"
+        return f"{match[1]}{table(variables_of[match[2], match[3]], dict(rows))}{match[4]}"
 
     return TABLE.sub(written, text)
 

@@ -138,13 +138,13 @@ def without_lines_of_their_own(
 
     A test is quick by itself or with its fixtures; where these are made for tests that stay, they cost it nothing.
     """
-    met, made, listed = set[tuple[str, int]](), set[str](), list[str]()
+    covered, made, listed = set[tuple[str, int]](), set[str](), list[str]()
     for test in sorted(costs, key=lambda test: (costs[test].beside(set()), test)):
         lines = ran.get(test, set())
-        if lines and lines <= met and costs[test].beside(made) > quick and not test.startswith(PROMISES):
+        if lines and lines <= covered and costs[test].beside(made) > quick and not test.startswith(PROMISES):
             listed.append(test)
         else:
-            met |= lines
+            covered |= lines
             made |= costs[test].fixtures.keys()
     return sorted(test for test in listed if costs[test].beside(made) > quick)
 
