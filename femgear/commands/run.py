@@ -145,22 +145,13 @@ def run(
     from femgear.storage.files import resumable
     from femgear.storage.results import completed_since_now, run_folder
     from femgear.trains.reading import read_case
-    from femgear.trains.registry import check_case, stage_names, train_of
+    from femgear.trains.registry import check_case, train_of
 
-    if only is not None and only not in (names := stage_names()):
-        raise CaseError(
-            "no train has this stage",
-            code="E-ARGUMENTS",
-            key="--only",
-            value=only,
-            limit=", ".join(names),
-            remedy="femgear run --help",
-        )
+    _refuse_unknown_stage(only)
     case = case or _only_case()
     data = read_case(case)
     check_case(data, only)  # refuse before the folder is touched
-    output = output or results_folder(case)
-    train = train_of(data)
+    train, output = train_of(data), output or results_folder(case)
     of_case = warning_lines(train.case_warnings(data), whole=verbose)
     print_warnings(of_case)
     place = run_folder(output, case=data.source, force=force)
@@ -171,12 +162,11 @@ def run(
                 """Print what was found, before anything is drawn."""
                 lines = warning_lines(train.result_warnings(results), whole=verbose)
                 with progress.aside():
-                    if not json:
-                        if verbose:
-                            print_blocks(train.describe_results(results))
-                        else:
-                            print_briefly(train.describe_briefly(results, only), room_of_warnings((*of_case, *lines)))
-                        sys.stdout.flush()
+                    if verbose and not json:
+                        print_blocks(train.describe_results(results))
+                    elif not json:
+                        print_briefly(train.describe_briefly(results, only), room_of_warnings((*of_case, *lines)))
+                    sys.stdout.flush()
                     print_warnings(lines)
                 if pictures:
                     load_xarray()
@@ -184,12 +174,32 @@ def run(
             run_case(data, folder, only=only, pictures=pictures, progress=progress, computed=tell_numbers)
         if json:
             return _print_run(output)
-        say(f"results: {output}")
-        if pictures:
-            say(f"report:  {output / 'report.html'}")
-        if not verbose:
-            say(f"tables:  femgear report {shlex.quote(str(output))} --verbose")
+        _say_where_results_are(output, pictures=pictures, verbose=verbose)
     return 0
+
+
+def _refuse_unknown_stage(name: str | None) -> None:
+    """Refuse a stage that no train has."""
+    from femgear.trains.registry import stage_names
+
+    if name is not None and name not in (names := stage_names()):
+        raise CaseError(
+            "no train has this stage",
+            code="E-ARGUMENTS",
+            key="--only",
+            value=name,
+            limit=", ".join(names),
+            remedy="femgear run --help",
+        )
+
+
+def _say_where_results_are(output: Path, *, pictures: bool, verbose: bool) -> None:
+    """Say the folder of the results, the report if there is one, and how to see tables that were not printed."""
+    say(f"results: {output}")
+    if pictures:
+        say(f"report:  {output / 'report.html'}")
+    if not verbose:
+        say(f"tables:  femgear report {shlex.quote(str(output))} --verbose")
 
 
 def load_xarray() -> None:

@@ -286,16 +286,7 @@ def contact_candidates(
         of_kind = setup.kind(at[0]) == kind
         values, again = _within_windows(setup, bodies, kind, *(part[of_kind] for part in at))
         local[filled[0][of_kind], filled[1][of_kind]] = values[again]
-    turns = setup.gears.rotation_approach
-    approach = np.vstack([turns, -turns])[:meshes]
-    supports = np.zeros((meshes, meshes))
-    if members is not None:
-        if setup.images == 1:
-            approach = np.hstack([approach, members.approach[:, members.free]])
-        supports = members.compliance
-    if setup.images > 1 and members is not None:
-        image = setup.places[1]
-        supports = np.sum([supports[image == 0][:, image == i] for i in range(setup.images)], axis=0)
+    approach, supports = _motions_and_supports(setup, members, meshes)
     rubbing = None
     if friction is not None and members is not None:
         image = setup.places[1] if setup.images > 1 else None
@@ -320,6 +311,21 @@ def contact_candidates(
         friction=rubbing,
         cracks=cracks,
     )
+
+
+def _motions_and_supports(
+    setup: MeshWindows, members: MovingMembers | None, meshes: int
+) -> tuple[np.ndarray, np.ndarray]:
+    """Approach (M, m) of the meshes by all motions, and compliance of sprung members between them (M, M) [m/N]."""
+    turns = setup.gears.rotation_approach
+    approach = np.vstack([turns, -turns])[:meshes]
+    if members is None:
+        return approach, np.zeros((meshes, meshes))
+    if setup.images == 1:
+        return np.hstack([approach, members.approach[:, members.free]]), members.compliance
+    image = setup.places[1]
+    of_images = [members.compliance[image == 0][:, image == number] for number in range(setup.images)]
+    return approach, np.sum(of_images, axis=0)
 
 
 def assemble_contact(

@@ -413,9 +413,6 @@ def windows(  # noqa: PLR0913
     arc = start[..., None] + width * cell_centres(cells)[layout]
     gap = _separation_at(pair, zeta[..., None], arc, form) + np.asarray(shift)[..., None]
     gap = np.where((arc < high[..., None]) & (low < high)[..., None], gap, np.inf)
-    node_arc = np.minimum(start[..., None] + WINDOW_NODES * width, np.maximum(high, low + width)[..., None])
-    roll_1 = np.sqrt(2 * pair.base_radius_1 * node_arc)
-    roll_2 = separation(pair, zeta[..., None], roll_1)[1]
     begin, end = pair.path if limits is None else pair.path_between(limits)
     smallest = gap.min(axis=-1)
     on_path = (zeta >= begin) & (zeta <= end)
@@ -425,12 +422,19 @@ def windows(  # noqa: PLR0913
         zeta=counted,
         near=on_path & np.isfinite(smallest) if line_of_action else near,
         gap=gap,
-        roll=np.stack([roll_1, roll_2]),
+        roll=_node_rolls(pair, zeta, start, width, np.maximum(high, low + width)),
         at_edge=at_edge,
         layout=layout,
         centre=start + 0.5 * width - nominal,
         cell=np.full(len(zeta), width / cells),
     )
+
+
+def _node_rolls(pair: FlankPair, zeta, start, width: float, end) -> np.ndarray:
+    """Roll lengths (2, ..., 3) [m] of the nodes of windows on both flanks, from arcs (...) of start and end [m]."""
+    node_arc = np.minimum(start[..., None] + WINDOW_NODES * width, end[..., None])
+    roll_1 = np.sqrt(2 * pair.base_radius_1 * node_arc)
+    return np.stack([roll_1, separation(pair, zeta[..., None], roll_1)[1]])
 
 
 def cell_edges(cells: int) -> np.ndarray:
