@@ -192,9 +192,12 @@ def _ratios(x: np.ndarray, spread: float) -> Iterator[np.ndarray]:
     for n, (far, near) in enumerate(zip(_hankel(x * spread), _hankel(x))):
         with np.errstate(invalid="ignore", over="ignore"):
             ratio = far[0] / near[1]
+        if not (finite := np.isfinite(ratio)).all():
             # where Hankel functions exceed the largest number, the limit of low frequencies is exact
-            limit = -x / max(n, 1) * spread ** -float(n) * np.exp(1j * (spread - 1) * x)
-        yield np.where(np.isfinite(ratio), ratio, limit)
+            with np.errstate(invalid="ignore", over="ignore"):
+                limit = -x / max(n, 1) * spread ** -float(n) * np.exp(1j * (spread - 1) * x)
+            ratio = np.where(finite, ratio, limit)
+        yield ratio
 
 
 def _efficiencies(ka: np.ndarray) -> Iterator[np.ndarray]:
@@ -213,8 +216,9 @@ def _hankel(x: np.ndarray) -> Iterator[tuple[np.ndarray, np.ndarray]]:
     yield before, -here
     for n in count(1):
         with np.errstate(invalid="ignore", over="ignore"):
-            yield here, before - n / x * here
-            before, here = here, 2 * n / x * here - before
+            share = n / x * here
+            yield here, before - share
+            before, here = here, 2 * share - before
 
 
 def sound_pressure(lines: SensorLines, cylinder: Cylinder, microphone: Microphone) -> np.ndarray:

@@ -241,7 +241,7 @@ def test_run_prints_answers_and_verdict_in_45_lines_and_the_report_all_tables(tm
     assert cli.main(["report", str(out), "--verbose"]) == 0
     assert "Dynamics" in capsys.readouterr().out
     monkeypatch.delenv("COLUMNS")
-    assert cli.main(["run", str(CASE), "-o", str(tmp_path / "only"), "--only", "static"]) == 0
+    assert cli.main(["run", str(CASE), "-o", str(tmp_path / "only"), "--only", "static", "--no-pictures"]) == 0
     assert "STE mean" in capsys.readouterr().out
 
 
