@@ -188,10 +188,11 @@ def response() -> GearboxResponse:
 
 
 @cache
-def answer_in_a_casing() -> Answer:
+def answer_in_a_casing(*, stresses: bool = False) -> Answer:
     """Answer of the pair with teeth in a casing on feet, with a sensor and a run-up of two speeds."""
     tables = pair_tables(teeth=True) | {"casing": casing_tables(), "dynamics": {"up_to": "2 kHz"}}
     tables["deflection"] = {"slices": 5}
+    tables["pair"][0]["teeth"]["static"] |= {"stresses": stresses}
     tables["sensor"] = [{"name": "top", "position": ["90 mm", "80 mm", "40 mm"], "direction": "y"}]
     tables["runup"] = {"from": "900 rpm", "to": "1100 rpm", "count": 2}
     return Answer(read_case(tables), Steps())

@@ -24,7 +24,7 @@ class Files(SimpleNamespace):
 
 @pytest.fixture(scope="module")
 def results():
-    answer = answer_in_a_casing()
+    answer = answer_in_a_casing(stresses=True)
     data = {name: answer[name].contents() for name in answer}
     manifest = SimpleNamespace(complete=True)
     return Files(stages=tuple(data), findings=(), case=answer.case, manifest=manifest, **data)
