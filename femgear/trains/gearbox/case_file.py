@@ -61,6 +61,7 @@ from femgear.case.sections import (
 )
 from femgear.case.text import ReadCase, described
 from femgear.errors import CaseError
+from femgear.remembered import remembered
 from femgear.trains.gearbox.materials import with_materials
 from femgear.trains.gearbox.transient_case import TransientSection, embed_torques
 from femgear.trains.reading import parse_case
@@ -739,6 +740,7 @@ def stage_case_of(text: str) -> Any:
     return parse_case(text, numbered=False)
 
 
+@remembered(latest=64)
 def teeth_of(stage: PairSection | BoxPlanetarySection) -> Any:
     """Read the case of the teeth of a stage; None of one that gives sizes and stiffnesses."""
     return None if stage.teeth is None else stage_case_of(case_text.write(stage.teeth))
