@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from femgear.case.load_spectrum import required_life
+from femgear.case.quantities import RPM
 from femgear.stages.judgements import (
     SMOOTH,
     Judgement,
@@ -72,9 +73,9 @@ def _largest_force(results: Any) -> str:
     factors = results.runup["dynamic_factor"].values
     factors = factors.reshape(len(factors), -1).max(axis=1)
     at = int(factors.argmax())
-    end = ", the end of the run-up" if at in (0, len(factors) - 1) else ""
+    end = ", its end" if at in (0, len(factors) - 1) else ""
     where = f"at {results.runup['speed'].values[at]:,.4g} rpm{end}"
-    return f"Its mesh force reaches {factors[at]:.2f} times its mean ({where})"
+    return f"In the run-up its mesh force reaches {factors[at]:.2f} times its mean ({where})"
 
 
 def judge_teeth(results: Any, rating: Rating | None, dynamic: np.ndarray | None = None) -> Iterator[Judgement]:
@@ -151,9 +152,15 @@ def _motion(results: Any, dynamic: np.ndarray | None) -> str:
         kinds = kind_names(results.dynamics["mesh"].values)
         dynamic = computed_dynamic_factor(results.dynamics, len(kinds))
     if dynamic is not None:
-        parts.append(f"dynamic factor K_v {_joined(dynamic, '.2f')}")
+        parts.append(f"dynamic factor K_v {_joined(dynamic, '.2f')}{_at_one_speed(results, kinds)}")
     text = ", ".join(parts)
     return f"{text} ({', '.join(kinds)})" if " and " in text and kinds else text
+
+
+def _at_one_speed(results: Any, kinds: Sequence[str]) -> str:
+    """Write the speed of operation of a pair that has one alone: ``" at 1,500 rpm"``, which the run-up goes beyond."""
+    speeds = results.case.operation.speeds
+    return f" at {speeds[0] / RPM:,.4g} rpm" if len(speeds) == len(kinds) == 1 else ""
 
 
 def _transmission_error(results: Any) -> tuple[np.ndarray, np.ndarray] | None:

@@ -177,9 +177,10 @@ def _largest_force(results: Any) -> str:
     speed, number, _ = np.unravel_index(int(np.nanargmax(factors)), factors.shape)
     where = f"{results[stage]['stage'].values[number]} at {results[stage]['speed'].values[speed]:,.4g} rpm"
     largest = float(np.nanmax(factors))
+    begin = "In the run-up its" if stage == "runup" else "Its"
     if largest < _CALM:
-        return f"Its mesh forces stay within {percent(_CALM - 1.0)} of their mean"
-    return f"Its mesh forces reach {largest:.2f} times their mean ({where})"
+        return f"{begin} mesh forces stay within {percent(_CALM - 1.0)} of their mean"
+    return f"{begin} mesh forces reach {largest:.2f} times their mean ({where})"
 
 
 def _unheard(results: Any) -> Judgement:

@@ -213,8 +213,10 @@ def gearbox_duty(case: GearboxCase) -> str:
     ends = [ShaftEnd(name, torque, (flow.speed[shafts[name]],)) for name, torque in flow.port_torque.items()]
     if not any(end.torque for end in ends):
         return "No torque acts: its modes alone are known."
-    hertz = dict.fromkeys(f"{in_digits(abs(frequency))} Hz" for frequency in flow.mesh_frequency.values() if frequency)
-    facts = [f"teeth mesh at {' and '.join(hertz)}"] if 0 < len(hertz) <= _MOST_MESHES else []
+    frequencies = (abs(frequency) for frequency in flow.mesh_frequency.values() if frequency)
+    hertz = [*dict.fromkeys(f"{in_digits(frequency)} Hz" for frequency in frequencies)]
+    words = " and ".join(filter(None, (", ".join(hertz[:-1]), *hertz[-1:])))
+    facts = [f"teeth mesh at {words}"] if 0 < len(hertz) <= _MOST_MESHES else []
     facts += [f"{case.load_case.name}, one of {len(load_cases)} load cases"] if load_cases[1:] else []
     return duty_sentence(ends, ", ".join(facts))
 
