@@ -395,6 +395,15 @@ def _joined(blocks: list[_Solved], rows: np.ndarray, before: _Solved | None) -> 
     return _Solved(joined, overflowing, nearest, max(most, before.candidates))
 
 
+def shorter_steps(step: np.ndarray, missed: np.ndarray, before: np.ndarray) -> np.ndarray:
+    """Halve the steps (P,) of a fixed point where what is missed (M, P) [m] turns round and does not shrink by half.
+
+    Gears whose teeth touch at the edges of pits and of what is left of a tooth would swing between two arcs for ever.
+    """
+    swings = np.sum(missed * before, axis=0) < -0.5 * np.sum(before**2, axis=0)
+    return np.where(swings, 0.5 * step, step)
+
+
 @dataclass(frozen=True)
 class _Walk:
     """A set under a torque that is not negative, and the record without load at the positions to solve.
@@ -482,11 +491,15 @@ class _Walk:
         if not self._far_off:
             return self._outcome(setup, solved, share, nearest)
         turned = np.zeros((len(self.planetary_set.meshes), len(every)))
+        step, missed_before = np.ones(len(every)), np.zeros_like(turned)
         for _ in range(_MOST_TURNS):
             if solved.nearest > 0.0:
                 break
-            before, turned = turned, self._turned(solved.values)
-            moved = np.abs(turned - before).max(axis=0) > _TURNED * np.abs(turned).max()
+            goal = self._turned(solved.values)
+            missed = goal - turned
+            moved = np.abs(missed).max(axis=0) > _TURNED * np.abs(goal).max()
+            step = shorter_steps(step, missed, missed_before)
+            turned, missed_before = np.where(step < 1.0, turned + step * missed, goal), missed
             if not moved.any():
                 break
             setup, solved = self._solved_at(np.flatnonzero(moved), share, nearest, turned, solved)

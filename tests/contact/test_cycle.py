@@ -8,7 +8,7 @@ import pytest
 from femgear.contact import batch as batch_module
 from femgear.contact.assembly import assemble_contact
 from femgear.contact.bodies import make_bodies, make_sectors
-from femgear.contact.cycle import CycleOptions, walk_mesh_cycle
+from femgear.contact.cycle import CycleOptions, shorter_steps, walk_mesh_cycle
 from femgear.contact.solve import solve_contact
 from femgear.contact.supports import Supports
 from femgear.contact.windows import mesh_windows
@@ -328,3 +328,16 @@ def test_meshes_are_coupled_under_the_lightest_load(gears, bodies):
     apart = ~np.eye(6, dtype=bool)
     assert (np.diag(light) > own).all()
     assert np.abs(light - usual)[apart].max() < 0.1 * np.abs(usual[apart]).max() > 0.0
+
+
+def test_steps_of_a_fixed_point_that_swings_shorten_until_it_rests():
+    """F(x) = 3 - s x rests at 3/(1 + s): with s = 1 it would swing for ever, with s = 2 run away."""
+    slope = np.array([0.4, 1.0, 2.0])
+    turned, step, before = np.zeros((1, 3)), np.ones(3), np.zeros((1, 3))
+    for _ in range(30):
+        missed = 3.0 - slope * turned - turned
+        step = shorter_steps(step, missed, before)
+        turned, before = turned + step * missed, missed
+    assert turned[0] == pytest.approx(3.0 / (1.0 + slope), rel=1e-5)
+    # what shrinks by more than half of itself keeps whole steps
+    assert step[0] == 1.0 and (step[1:] == 0.5).all()
