@@ -396,9 +396,21 @@ def _joined(blocks: list[_Solved], rows: np.ndarray, before: _Solved | None) -> 
 
 
 def shorter_steps(step: np.ndarray, missed: np.ndarray, before: np.ndarray) -> np.ndarray:
-    """Halve the steps (P,) of a fixed point where what is missed (M, P) [m] turns round and does not shrink by half.
+    """Halve steps of a fixed point at the positions where what is missed turns round and does not shrink by half.
 
     Gears whose teeth touch at the edges of pits and of what is left of a tooth would swing between two arcs for ever.
+
+    Parameters
+    ----------
+    step : (P,) array
+        Shares of what is missed that are taken at every position.
+    missed, before : (M, P) arrays
+        What is missed by the solution, and by the one before [m].
+
+    Returns
+    -------
+    (P,) array
+        The steps to take.
     """
     swings = np.sum(missed * before, axis=0) < -0.5 * np.sum(before**2, axis=0)
     return np.where(swings, 0.5 * step, step)
