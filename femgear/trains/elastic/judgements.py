@@ -155,10 +155,10 @@ def _resonance(results: Any, loudest_speed: float) -> tuple[str, str]:
     mode, harmonic = int(runup["mode"].values[at]), int(runup["mesh_harmonic"].values[at])
     speed, side = float(speeds[at]), "below" if distance[at] < 0.0 else "above"
     share, apart = float(makes[at]) ** 2, f"{abs(distance[at]):.1f} % {side} {speed:,.4g} rpm"
-    power = f"{percent(share)} of the power" if share < 1.0 else "as loud as all lines"
-    lines = f"all lines of that harmonic by that mode are {power}"
+    power = f"{percent(share)} of the power" if share < 1.0 else "as much as all lines together"
+    lines = f"all lines of that harmonic by that mode make {power}"
     card = f"mode {mode} meets mesh harmonic {harmonic}, {apart}: {lines}"
     if not at_loudest.any():
         return card, ""
     kind = f" ({results.modes['kind'].values[mode - 1]})" if "modes" in results.stages else ""
-    return card, f"mode {mode}{kind} meets mesh harmonic {harmonic}, {lines}"
+    return card, f"mesh harmonic {harmonic} excites mode {mode}{kind}, which makes {power}"
