@@ -229,6 +229,18 @@ def test_a_run_loads_xarray_without_dask_and_pint():
     subprocess.run([sys.executable, "-c", code], check=True, timeout=60)
 
 
+def test_a_run_loads_scipy_without_tests_and_fortran():
+    """Which come when somebody asks for them."""
+    code = (
+        "import sys\nfrom femgear.commands.run import load_scipy\nload_scipy()\nload_scipy()\n"
+        "import numpy as np\nimport scipy.linalg\n"
+        "assert scipy.linalg.det(np.eye(2)) == 1.0\n"
+        "assert not {'numpy.f2py', 'numpy.testing', 'unittest'} & sys.modules.keys()\n"
+        "np.testing.assert_allclose(1.0, 1.0)\nassert np.f2py.__name__ == 'numpy.f2py'\n"
+    )
+    subprocess.run([sys.executable, "-c", code], check=True, timeout=60)
+
+
 def test_a_run_without_pictures_loads_neither_xarray_nor_what_draws(tmp_path):
     from femgear.trains.reading import read_case, with_values
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import ctypes
 import shlex
 import sys
 import textwrap
@@ -28,6 +29,8 @@ from femgear.errors import CaseError, FemgearError
 
 if TYPE_CHECKING:
     from femgear.case.text import ReadCase
+
+_M_TRIM_THRESHOLD, _M_MMAP_THRESHOLD = -1, -3
 
 
 @app.command
@@ -141,6 +144,8 @@ def run(
     json
         Print answers, key figures and findings as JSON, and nothing else on standard output (docs/command_line.md).
     """
+    keep_freed_memory()
+    load_scipy()
     from femgear.run import run_case
     from femgear.storage.files import resumable
     from femgear.storage.results import completed_since_now, run_folder
@@ -200,6 +205,31 @@ def _say_where_results_are(output: Path, *, pictures: bool, verbose: bool) -> No
         say(f"report:  {output / 'report.html'}")
     if not verbose:
         say(f"tables:  femgear report {shlex.quote(str(output))} --verbose")
+
+
+def keep_freed_memory() -> None:
+    """Let this process keep up to 256 MB that arrays have freed, which the next ones take.
+
+    To give back and to clear pages between the steps of the periodic response takes longer than the steps.
+    Names and numbers are those of mallopt(3) of the GNU C library; others have no such call.
+    """
+    set_option = getattr(ctypes.CDLL(None), "mallopt", None) if sys.platform == "linux" else None
+    if set_option is not None:
+        set_option(_M_MMAP_THRESHOLD, 32 * 2**20)
+        set_option(_M_TRIM_THRESHOLD, 256 * 2**20)
+
+
+def load_scipy() -> None:
+    """Load SciPy without NumPy's tools for tests and Fortran, which it takes along, uses nowhere and waits for."""
+    import numpy as np
+
+    unused = [name for name in ("f2py", "testing") if f"numpy.{name}" not in sys.modules]
+    vars(np).update(dict.fromkeys(unused))  # else NumPy loads them as it is asked for all its names
+    try:
+        import scipy.linalg  # noqa: F401
+    finally:
+        for name in unused:
+            vars(np).pop(name, None)  # from now on it loads them again where one asks
 
 
 def load_xarray() -> None:
