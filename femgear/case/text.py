@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 import os
+import pickle
 import re
 import stat
 import tomllib
@@ -103,6 +104,17 @@ def parse(text: str, name: str) -> dict:
     ``name`` is that of the file, for messages. CaseError: syntax, with line and column, a key given twice,
     with both lines, or nested too deeply (E-TOML); E-FINITE, with keys and lines.
     """
+    return pickle.loads(_pickled_tables(text, name))
+
+
+@lru_cache(maxsize=4)
+def _pickled_tables(text: str, name: str) -> bytes:
+    """Tables of the latest texts: variants of a case all begin with its text, and change tables of their own."""
+    return pickle.dumps(_tables(text, name))
+
+
+def _tables(text: str, name: str) -> dict:
+    """Read tables, see `parse`."""
     # such a key stands on one line, and most texts have no line with so many dots
     suspects = (line for line in text.split("\n") if line.count(".") >= _LONG)
     if sum(len(_LONG_KEY.findall(line)) for line in suspects) > _MOST_LONG_KEYS:
