@@ -215,7 +215,9 @@ class Form:
         for entry in shown:
             inner = form_within(value.get(entry.name))
             if inner is not None:
-                self._fold(replace(inner, name=entry.name), prefix + entry.name, value.get(entry.name))
+                # what its schema says beyond the first sentence is about files and programs
+                within = replace(inner, name=entry.name, hint=f"{inner.hint.partition('.')[0]}.")
+                self._fold(within, prefix + entry.name, value.get(entry.name))
             else:
                 self._field(entry, prefix + entry.name, value.get(entry.name))
         if not others:

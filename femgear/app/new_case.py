@@ -102,13 +102,14 @@ def _read(kind: str, field: str, written: str) -> Any:
         return written
     number = float if field == "hardness" else int
     parts = re.split(r"[\s,;/]+", written) if field == "teeth" else [written]
-    try:
-        numbers = [number(part) for part in parts]
-    except ValueError as error:
-        limit = "numbers" if number is float else "whole numbers"
-        raise CaseError(
-            f"{written!r} is not read", code="E-TYPE", limit=limit, remedy=f"write it as in {examples[field]}"
-        ) from error
+    what = "number" if number is float else "whole number"
+    numbers = []
+    for part in parts:
+        try:
+            numbers.append(number(part))
+        except ValueError as error:
+            text, remedy = f"a {what} is needed, not {part!r}", f"write it as in {examples[field]}"
+            raise CaseError(text, code="E-TYPE", limit=f"{what}s", remedy=remedy) from error
     if field == "teeth":
         return tuple(numbers)
     return int(numbers[0]) if float(numbers[0]).is_integer() else numbers[0]

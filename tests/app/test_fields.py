@@ -130,3 +130,20 @@ def test_what_is_said_stands_beside_the_fields(filled):
     assert filled.field("operation.torque").error is None and filled.fold("operation").props["icon"] == "warning"
     filled.form.say([], [], {})
     assert "icon" not in filled.fold("operation").props and "hint" not in filled.field("operation.input").props
+
+
+def test_teeth_within_a_gearbox_are_explained_to_users(filled):
+    """Not to programmers, as the schema of a case of their own does in its further sentences."""
+    from nicegui import ElementFilter, ui
+
+    from femgear.app.fields import Form, form_of_model, form_within
+    from femgear.trains.drafts import new_case
+
+    tables = tomllib.loads(new_case("gearbox"))
+    assert "source" in form_within(tables["pair"][0]["teeth"]).hint
+    form = Form(filled.change, filled.change_rows, filled.pinned.append)
+    form.show(form_of_model("gearbox"), tables)
+    for name in ("pair", "teeth"):
+        filled.fold(name).value = True
+    hints = [label.text for label in ElementFilter(kind=ui.label) if "hint" in label.classes]
+    assert any(text.startswith("Two gears") for text in hints) and not any("source" in text for text in hints)

@@ -62,6 +62,24 @@ def test_a_mistake_stands_beside_its_field(kind, typed, field):
     assert text == "" and list(problems) == [field] and not re.search(r"--\w", problems[field])
 
 
+@pytest.mark.parametrize(
+    ("field", "typed", "words"),
+    [
+        ("teeth", "17 30.5 91", "a whole number is needed, not '30.5'"),
+        ("planets", "2.5", "a whole number is needed, not '2.5'"),
+        ("hardness", "hard", "a number is needed, not 'hard'"),
+    ],
+)
+def test_what_is_no_number_is_named(field, typed, words):
+    assert drafted_case("planetary", {field: typed})[1][field].startswith(words)
+
+
+def test_teeth_without_one_centre_distance_are_told_what_closes():
+    words = drafted_case("planetary", {"teeth": "17 30 91"})[1]["teeth"]
+    assert "“Teeth” 17 37 91" in words
+    assert drafted_case("planetary", {"teeth": "17 37 91"})[1] == {}
+
+
 def test_teeth_that_do_not_go_with_planets_are_no_second_mistake():
     assert list(drafted_case("planetary", {"teeth": "x", "planets": "4"})[1]) == ["teeth"]
     assert drafted_case("planetary", {"teeth": "24 48 120", "planets": "4"})[1] == {}
