@@ -464,20 +464,20 @@ def _solve_together(
     if stage.parts or follower.parts or follower.name in run.timings or not second_core():
         return
 
-    def solved(member: Stage) -> tuple[Any, float]:
+    def solved(member: Stage, shown: Progress) -> tuple[Any, float]:
         """Result of a stage, or its error, which is raised in its turn, and seconds."""
         start = time.perf_counter()
         try:
-            result = member.solve(case, *map(results.get, member.takes), **_options(member, progress, run.steps))
+            result = member.solve(case, *map(results.get, member.takes), **_options(member, shown, run.steps))
         except Exception as error:
             result = error
         return result, time.perf_counter() - start
 
     def solve_follower() -> None:
-        run.ahead[follower.name] = solved(follower)
+        run.ahead[follower.name] = solved(follower, progress)
 
     progress(follower.name, 0, 1)
-    run.ahead[stage.name] = shared([partial(solved, stage)], solve_follower)[0]
+    run.ahead[stage.name] = shared([partial(solved, stage, silent)], solve_follower)[0]
 
 
 def _compute(
