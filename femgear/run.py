@@ -298,6 +298,8 @@ _WORTH_KEEPING = 10.0
 
 Less is computed again as soon, and its verdict comes before the files are written.
 """
+_SHORT = 5.0
+"""Seconds of all stages so far, below which the next one is short, too."""
 _LOSS = -0.1
 """Change of the level that is told when a rate leaves lines out [dB]."""
 
@@ -457,8 +459,11 @@ def _solve_together(
 ) -> None:
     """Solve a stage in a second process while this one solves the stage after it, where neither needs the other.
 
-    What a stage leaves in the steps of the run would be lost with the process.
+    What a stage leaves in the steps of the run would be lost with the process, and with an interrupt its
+    result: so only where all stages before were short.
     """
+    if not 0.0 < sum(run.timings.values()) < _SHORT:
+        return
     if follower is None or stage.name in follower.takes or "steps" in stage.options or run.ahead:
         return
     if stage.parts or follower.parts or follower.name in run.timings or not second_core():
