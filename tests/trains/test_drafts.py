@@ -202,10 +202,11 @@ def test_new_cases_have_modes(kind):
 
 
 def said(text):
-    """Codes of what a case is warned of, once it is found that it runs."""
+    """Codes of what a case is warned of, once it is found that it runs; what a draft leaves to defaults is no fault."""
     case = read_case(text)
     check_case(case)
-    return {one.code for one in train_of(case).case_warnings(case)} | {one.code for one in case.notices}
+    findings = (*train_of(case).case_warnings(case), *case.notices)
+    return {finding.code for finding in findings} - {"W-ESTIMATED"}
 
 
 LEFT_OVER = [(z, p, z + 2 * p + d) for d in (3, 4) for z in range(17, 46, 4) for p in range(17, 48, 5)][:99]
