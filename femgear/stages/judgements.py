@@ -443,7 +443,7 @@ def judge_smoothness(answer: str, results: Any, stages: Sequence[str], remedy: s
     """
     present = [stage for stage in stages if stage in results.stages]
     if not present:
-        return Judgement(SMOOTH, "absent", answer or "no motion", remedy)
+        return Judgement(SMOOTH, "absent", f"at rest: {answer}" if answer else "no motion", remedy)
     against = list(dict.fromkeys(_against(results, present)))
     of_motion = [finding for finding in results.findings if not finding.key.startswith("housing")]
     rests_on = f"; {words}" if (words := estimates_words(of_motion)) else ""

@@ -235,6 +235,8 @@ def test_a_run_is_smooth_unless_teeth_part_or_motions_grow():
     assert judge_smoothness("", smooth, ("dynamics",), SPEEDS).state == "good"
     still = judge_smoothness("", smooth, ("branch",), SPEEDS)
     assert (still.state, still.words, still.limit) == ("absent", "○ not computed", SPEEDS)
+    resting = judge_smoothness("transmission error 6.2 µm", smooth, ("branch",), SPEEDS)
+    assert resting.answer == "at rest: transmission error 6.2 µm"
     parted = Files(branch=xr.Dataset({"drive_contact": ("point", [1.0, 0.9]), "stable": ("point", [1, 0])}))
     judgement = judge_smoothness("K_v 1.2", parted, ("dynamics", "branch"), SPEEDS)
     assert judgement.state == "look" and judgement.limit == "teeth part, motions are not stable"
