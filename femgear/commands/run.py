@@ -224,12 +224,14 @@ def load_scipy() -> None:
     import numpy as np
 
     unused = [name for name in ("f2py", "testing") if f"numpy.{name}" not in sys.modules]
-    vars(np).update(dict.fromkeys(unused))  # else NumPy loads them as it is asked for all its names
+    for name in unused:
+        setattr(np, name, None)  # else NumPy loads them as it is asked for all its names
     try:
         import scipy.linalg  # noqa: F401
     finally:
         for name in unused:
-            vars(np).pop(name, None)  # from now on it loads them again where one asks
+            if getattr(np, name) is None:
+                delattr(np, name)  # from now on NumPy loads them where one asks
 
 
 def load_xarray() -> None:
