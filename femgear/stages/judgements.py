@@ -501,11 +501,11 @@ def voice_words(level: float) -> str:
     """Compare a sound pressure level [dB(A)] with the voice that is as loud, by `VOICES`; beyond them with the last."""
     (quietest, lowest), (loudest, highest) = VOICES[0], VOICES[-1]
     if level < lowest - 0.5 * _STEP_OF_VOICES:
-        return f"quieter than {quietest} voice 1 m away ({lowest:g} dB(A), ISO 9921)"
+        return f"quieter than {quietest} voice 1 m away"
     if level > highest + 0.5 * _STEP_OF_VOICES:
-        return f"louder than {loudest} voice 1 m away ({highest:g} dB(A), ISO 9921)"
-    voice, alike = min(VOICES, key=lambda of_voice: abs(level - of_voice[1]))
-    return f"as loud as {voice} voice 1 m away ({alike:g} dB(A), ISO 9921)"
+        return f"louder than {loudest} voice 1 m away"
+    voice, _ = min(VOICES, key=lambda of_voice: abs(level - of_voice[1]))
+    return f"as loud as {voice} voice 1 m away"
 
 
 @dataclass(frozen=True)

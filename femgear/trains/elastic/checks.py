@@ -348,7 +348,7 @@ def _assumed_for_levels(case: Case) -> Iterator[Finding]:
             "housing.microphone.distance",
             f"left out: dB(A) are those of a microphone {distance} from the outer surface of the ring",
             remedy="give the distance at which it is heard",
-            concerns=f"distance of the microphone ({distance})",
+            concerns=f"microphone distance ({distance})",
         )
 
 

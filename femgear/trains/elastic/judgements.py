@@ -83,7 +83,7 @@ def _noise(results: Any) -> Judgement:
     margins, levels = tuple(_margins(results)), [size_words]
     if "runup" in results.stages:
         levels.append(loudest(results.runup, marks))
-        sentence += f". Loudest of the run-up: {_bound_in_words(levels[-1])}"
+        sentence += f". Largest of the run-up: {_bound_in_words(levels[-1])}"
     # a bound has no mark: it is one itself
     doubts = [*([CATALOGUE["W-EXCITATION"].words] if any(map(is_bound, levels)) else []), *marks.words]
     rests_on = estimates_words(results.findings)
@@ -156,7 +156,7 @@ def _resonance(results: Any, loudest_speed: float) -> tuple[str, str]:
     speed, side = float(speeds[at]), "below" if distance[at] < 0.0 else "above"
     share, apart = float(makes[at]) ** 2, f"{abs(distance[at]):.1f} % {side} {speed:,.4g} rpm"
     power = f"{percent(share)} of the power" if share < 1.0 else "as much as all lines together"
-    lines = f"all lines of that harmonic by that mode make {power}"
+    lines = f"all their lines make {power}"
     card = f"mode {mode} meets mesh harmonic {harmonic}, {apart}: {lines}"
     if not at_loudest.any():
         return card, ""

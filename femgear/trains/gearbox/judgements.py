@@ -131,9 +131,15 @@ def _least(safety: tuple[float, tuple[int, int, int]] | None, data: Any) -> Leas
 
 
 def _stresses(results: Any) -> str:
+    """Write the largest stresses of the teeth in the load case that pictures are of, named where there are several."""
     if "stress" not in results.stages:
         return ""
-    return stresses_text(*(results.stress[name].values for name in ("root_worst", "largest_pressure")))
+    return stresses_text(*(results.stress[name].values for name in ("root_worst", "largest_pressure"))) + _load_case(results)
+
+
+def _load_case(results: Any) -> str:
+    """Name the load case that stresses and response are of, in brackets; empty where there is but one."""
+    return f" ({results.case.load_case.name})" if len(results.case.operation.load_case) > 1 else ""
 
 
 def _motion(results: Any) -> str:
@@ -150,7 +156,7 @@ def _motion(results: Any) -> str:
     if "dynamics" in results.stages:
         factors = results.dynamics["dynamic_factor"].values
         if np.isfinite(factors).any():
-            parts.append(f"dynamic factor K_v {np.nanmax(factors):.2f}{_longer(results)}")
+            parts.append(f"dynamic factor K_v {np.nanmax(factors):.2f}{_longer(results)}{_load_case(results)}")
     elif "balance" in results.stages:
         mean, largest = (results.balance[name].values for name in ("mean_force", "largest_force"))
         carries = mean > _IDLE * largest.max()
@@ -219,7 +225,7 @@ def _noise(results: Any) -> Judgement:
     if "path_share" in data:
         sentence += f"; the largest part comes by {main_way(data, sensor)}"
     if "runup" in results.stages and "level" in results.runup:
-        sentence += f". Loudest of the run-up: {_loudest_of_run_up(results.runup, marks, name)}"
+        sentence += f". Largest of the run-up: {_loudest_of_run_up(results.runup, marks, name)}"
     open_words = "give sensor.level_limit, or femgear compare sets two runs beside one another"
     margins = tuple(_margins(results))
     rests_on = estimates_words(results.findings)

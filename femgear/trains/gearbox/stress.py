@@ -142,6 +142,9 @@ def why_no_stress(case: GearboxCase) -> str:
         return "deflection.contact is false: no load of teeth is computed"
     if not any(map(stresses_wanted, (*case.pair, *case.planetary))):
         return "no stage has teeth whose stresses are wanted"
+    if not any(case.load_case.torque.values()):
+        others = "; operation.first takes another load case" if case.operation.load_case[1:] else ""
+        return f"load case {case.load_case.name} has no torque{others}"
     return ""
 
 

@@ -52,7 +52,7 @@ def test_the_questions_of_a_gearbox_in_a_casing(results):
     near = f" near {mode}," if mode else ""
     assert f"{near} makes {percent(power)} of the power" in sentence
     way = data["path"].values[int(data["path_share"].values[0, :, sensor].argmax())]
-    assert f"the largest part comes by {way} (" in sentence and "Loudest of the run-up: " in sentence
+    assert f"the largest part comes by {way} (" in sentence and "Largest of the run-up: " in sentence
 
 
 def test_a_gearbox_whose_main_line_is_beside_a_mode_deserves_a_look(results):
@@ -129,7 +129,7 @@ def test_the_loudest_sensor_of_the_run_up_is_named_where_it_is_another_one(resul
         return {judgement.question: judgement for judgement in gearbox_judgements(two)}[QUIET].sentence
 
     assert " at sensor foot, 9" in sentence(["top", "foot"])
-    assert "Loudest of the run-up" in sentence(["foot", "top"]) and sentence(["foot", "top"]).count("sensor") == 1
+    assert "Largest of the run-up" in sentence(["foot", "top"]) and sentence(["foot", "top"]).count("sensor") == 1
 
 
 def test_sensors_of_a_gearbox_without_torque_are_told_why_they_hear_nothing(results):

@@ -53,6 +53,8 @@ def test_a_gearbox_without_teeth_or_contact_says_why_it_has_none(pair):
     assert why_no_stress(pair[1]) == ""
     assert "deflection.contact" in why_no_stress(with_values(pair[1], {"deflection.contact": False}))
     assert "no stage has teeth" in why_no_stress(read_case("cases/four_stage_reducer.toml"))
+    still = with_values(pair[1], {"operation.load_case[0].torque": dict.fromkeys(pair[1].load_case.torque, "0 N m")})
+    assert why_no_stress(still).endswith("has no torque")
 
 
 def test_the_verdict_says_which_stresses_differ_from_nominal_ones(stresses):
