@@ -134,7 +134,8 @@ def _stresses(results: Any) -> str:
     """Write the largest stresses of the teeth in the load case that pictures are of, named where there are several."""
     if "stress" not in results.stages:
         return ""
-    return stresses_text(*(results.stress[name].values for name in ("root_worst", "largest_pressure"))) + _load_case(results)
+    largest = (results.stress[name].values for name in ("root_worst", "largest_pressure"))
+    return stresses_text(*largest) + _load_case(results)
 
 
 def _load_case(results: Any) -> str:
