@@ -499,9 +499,9 @@ CATALOGUE = {
     ),
     "W-THRUST": Meaning(
         DOUBT,
-        "Axial forces tilt the planets, which the model holds upright.",
+        "Axial forces tilt the planets, which K_Hbeta takes as upright.",
         "planets tilt under thrust",
-        "Give the tilt that bearings allow as a lead slope of the planets.",
+        "Make a gearbox of the case (femgear gearbox CASE), or give the tilt that bearings allow as a lead slope.",
     ),
     "W-TIP": Meaning(
         NOTE,

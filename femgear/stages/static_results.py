@@ -876,15 +876,30 @@ def _helical(data: xr.Dataset) -> Iterator[Finding]:
         return
     couple, width = data["planet_couple"].values, data.attrs["face_width"]
     total = data["mesh_force"].values.reshape(2, *couple.shape).sum(axis=0)
-    offset = couple.sum() / total.sum()
-    if offset > 0.05 * width:
-        text = (
-            f"axial forces tilt every planet with up to {couple.max():.3g} N m, as loads "
-            f"{offset * 1e3:.2g} mm off the middle of the width would: bearings are taken to hold planets "
-            "upright, and K_Hbeta is that of upright planets"
-        )
+    if tilts := thrust_words(float(couple.max()), float(couple.sum() / total.sum()), width):
+        text = f"{tilts}: bearings are taken to hold planets upright, and K_Hbeta is that of upright planets"
         remedy = "give the tilt that bearings allow as a lead slope of the planets"
         yield Finding("W-THRUST", "set.helix_angle", text, remedy=remedy)
+
+
+def thrust_words(couple: float, offset: float, width: float) -> str:
+    """Say what couple axial forces put on every planet; empty of one that tilts no more than loads amid the width do.
+
+    Parameters
+    ----------
+    couple : float
+        Largest couple on a planet [N m].
+    offset : float
+        How far off the middle of the width mesh forces would make the same couple [m]; up to 5 % of the width are amid.
+    width : float
+        Face width [m].
+    """
+    if offset <= 0.05 * width:
+        return ""
+    return (
+        f"axial forces tilt every planet with up to {couple:.3g} N m, as loads {offset * 1e3:.2g} mm off the middle "
+        "of the width would"
+    )
 
 
 def _narrow(data: xr.Dataset) -> Finding:

@@ -14,12 +14,14 @@ J. D. Smith, Gear Noise and Vibration, 2nd ed., 2003). It leaves out that loaded
 neighbours along, and that teeth are softer at their ends. Each slice has the stiffness of the spur gear of
 its normal section, per length of the contact line.
 
-Refused before anything is computed are supports that are missing and torques too large.
+Refused before anything is computed are supports that are missing and torques too large. Planets that tilt on their pins
+under the thrust of their teeth are a doubt of safeties without K_Hbeta (ISO 6336-1, method C).
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from pathlib import Path
@@ -28,19 +30,23 @@ from typing import TYPE_CHECKING, Literal, NoReturn
 import numpy as np
 
 from femgear.case.fault_sections import no_faults
-from femgear.case.gear_set import materials_of, support_stiffness
+from femgear.case.gear_set import materials_of, planetary_set, support_stiffness
 from femgear.case.tooth_friction import no_acting_friction
 from femgear.contact.bodies import make_bodies, make_sectors
 from femgear.contact.cycle import walk_mesh_cycle
 from femgear.errors import CaseError, ConvergenceError, GeometryError
-from femgear.findings import percent
+from femgear.findings import Finding, percent
 from femgear.gears import profile
-from femgear.gears.iso6336_stiffness import material_factor
+from femgear.gears.iso6336_load import face_load_factor
+from femgear.gears.iso6336_stiffness import BENDING_SHARE, material_factor, pair_mesh_stiffness
 from femgear.gears.kinematics import torques
+from femgear.gears.pair import BRANCH
 from femgear.gears.planetary import virtual_set
 from femgear.solvers.linear.modal import undamped_modes
 from femgear.stages.lumped_set import check_one_period, driving_torque, mesh_stiffnesses, needed, torsional_support
 from femgear.stages.protocol import one_blas_thread
+from femgear.stages.static_results import set_warnings, thrust_words
+from femgear.stages.strength import rating_wanted
 from femgear.system.mesh_directions import gear_set_system
 from femgear.system.rigid_bodies import (
     ContactLines,
@@ -69,6 +75,8 @@ _AXES = {"axial_stiffness": ("axial", "thrust"), "tilt_stiffness": ("tilt", "til
 # c' of steel teeth [N/m^2] (ISO 6336-1, method B); what teeth give way by
 # before nothing is left of their contact [modules]
 _TOOTH, _MOST = 14e9, 0.25
+# K_Hbeta of tilted planets that safeties may leave out: 5 % of S_F, half of it of S_H
+_TILTED = 1.05
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -531,3 +539,45 @@ def _supported(data: HelicalSet, body: str, entry: str) -> HelicalSet:
         return replace(data, planet_bearing=replace(data.planet_bearing, **change))
     held_body = getattr(data, body)
     return replace(data, **{body: replace(held_body, support=replace(held_body.support, **change))})
+
+
+def helical_warnings(case: HelicalCase) -> Iterator[Finding]:
+    """List what is allowed in a helical set but deserves a look."""
+    yield from set_warnings(case)
+    in_slices = case.helical.mesh_stiffness is None and case.static.slices > 1
+    if rating_wanted(case) and not in_slices and case.operation.torque != 0.0:
+        yield from _thrust_doubts(case, planetary_set(case))
+
+
+def _thrust_doubts(case: HelicalCase, gears: PlanetarySet) -> Iterator[Finding]:
+    """Doubt safeties without the K_Hbeta of planets that axial forces tilt on their pins, where it is above `_TILTED`.
+
+    ``tan(beta_b) F`` of sun and ring, on the working circles, tilt a planet about the tangent. Pins hold it, and so do
+    its meshes by ``k b^2/12 sin^2(alpha_wt)``. Radial slopes part flanks by ``sin(alpha_wt)`` of them. Sun and ring
+    stay upright: equal planets at equal angles leave them no couple.
+    """
+    sun = torques(gears, member=case.operation.input, torque=case.operation.torque).sun
+    force = abs(sun) / (gears.n_planets * gears.sun.base_radius)
+    base = profile.base_helix_angle(case.sun.pressure_angle, case.helical.helix_angle)
+    moduli, widths = [material.youngs_modulus for material in materials_of(case)], np.array(gears.mesh_widths)
+    angles = np.array([pair.working_pressure_angle for pair in gears.kinds])
+    arms = gears.gears[BRANCH].base_radius / np.cos(angles)
+    couple, offset = force * math.tan(base) * arms.sum(), 0.5 * math.tan(base) * arms.sum()
+    # c_gammabeta of both kinds of mesh [N/m^2]
+    stiffness = BENDING_SHARE * np.array(
+        [
+            material_factor(*of_mesh) * pair_mesh_stiffness(pair, case.helical.helix_angle)[1]
+            for pair, of_mesh in zip(gears.kinds, pairwise(moduli), strict=True)
+        ]
+    )
+    by_meshes = (stiffness * widths**3 / 12.0 * np.sin(angles) ** 2).sum()
+    tilt = couple / (case.helical.planet.tilt_stiffness + by_meshes)
+    apart = tilt * widths * np.sin(angles)
+    factor = max(face_load_factor(*values) for values in zip(apart, force / widths, stiffness, strict=True))
+    tilts = thrust_words(couple, offset, float(widths.min()))
+    if tilts and factor > _TILTED:
+        text = f"{tilts}: by {1e3 * tilt:.2g} mrad, which makes K_Hbeta about {factor:.2g}. Safeties leave it out"
+        remedy = (
+            "femgear gearbox CASE makes a gearbox, whose K_Hbeta has the tilts of its planets; stiffer pins tilt less"
+        )
+        yield Finding("W-THRUST", "helical.planet.tilt_stiffness", text, remedy=remedy)

@@ -56,7 +56,7 @@ from femgear.stages.static import (
     solve_static,
     solve_stress,
 )
-from femgear.stages.static_results import StaticResult, StressResult, describe_set, set_warnings
+from femgear.stages.static_results import StaticResult, StressResult, describe_set
 from femgear.stages.strength_results import strength_verdict
 from femgear.stages.tooth_figures import tooth_key_figures
 from femgear.stages.train_judgements import set_judgements
@@ -77,6 +77,7 @@ from femgear.trains.helical.model import (
     helical_data,
     helical_excitation,
     helical_friction,
+    helical_warnings,
     normal_record,
     section_stiffness,
     shared_load,
@@ -360,7 +361,7 @@ HELICAL = Train(
         ),
     ),
     describe=lambda case: (*describe_set(case), *describe_helical(case, planetary_set(case))),
-    warnings=set_warnings,
+    warnings=helical_warnings,
     bodies=case_bodies,
     judgements=set_judgements,
     duty=set_duty,

@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -11,6 +12,7 @@ from scipy.optimize import root
 from uneven_set import ANGLES, UNEVEN
 
 from femgear.errors import CaseError
+from femgear.findings import DOUBT
 from femgear.solvers.linear.modal import undamped_modes
 from femgear.system.mesh_directions import (
     dof_names,
@@ -20,10 +22,13 @@ from femgear.system.mesh_directions import (
     pin_directions,
 )
 from femgear.system.rigid_bodies import HelicalBody, HelicalSupport, PlanarTorque, body_masses, gear_geometry
-from femgear.trains.helical.model import HelicalSet, contact_ratios
+from femgear.trains.helical.model import HelicalSet, contact_ratios, helical_warnings
+from femgear.trains.reading import read_case, with_values
 from validation import helical
 from validation.helical import rigid_motions
 from validation.planetary import nrel_set
+
+CASES = Path(__file__).parents[3] / "cases"
 
 
 def uneven(**changes):
@@ -357,3 +362,57 @@ def test_data_that_no_set_can_have_are_refused(changes, text):
     with pytest.raises(CaseError, match="E-RANGE") as caught:
         kahraman_set(**changes)
     assert text in caught.value.message
+
+
+SOFT_PINS = {
+    "material.treatment": "case hardened steel",
+    "material.hardness": 700,
+    "helical.planet.tilt_stiffness": "4608 N m/rad",
+}
+GIVEN_MESHES = {"sun_planet": "200e6 N/m", "planet_ring": "200e6 N/m"}
+
+
+def thrust_findings(**changes):
+    """W-THRUST of the reference case with safeties, on pins as soft as those of a draft, before changes."""
+    changes = SOFT_PINS | {key.replace("__", "."): value for key, value in changes.items()}
+    case = with_values(read_case(CASES / "helical_30_20_70.toml"), changes)
+    return [finding for finding in helical_warnings(case) if finding.code == "W-THRUST"]
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {},
+        {"helical__mesh_stiffness": GIVEN_MESHES},
+        {"helical__mesh_stiffness": GIVEN_MESHES, "static__slices": 25},
+        {"operation__torque": "-150 N m"},
+    ],
+)
+def test_safeties_of_planets_that_tilt_are_doubted(changes):
+    """19.54 N m are the moment of the pins by the rigid bodies (docs/helical.md)."""
+    (doubt,) = thrust_findings(**changes)
+    assert doubt.severity == DOUBT and doubt.key == "helical.planet.tilt_stiffness"
+    assert "up to 19.5 N m" in doubt.text and "femgear gearbox CASE" in doubt.remedy
+
+
+def test_tilt_under_thrust_makes_the_load_over_the_width_uneven():
+    """By hand on pins of 1e5 N m/rad: 0.19 mrad, 1.73 um over 25 mm; a mesh of 14 N/(mm um) gives by 4.5 um."""
+    stiff, soft = (thrust_findings(helical__planet__tilt_stiffness=f"{k} N m/rad")[0].text for k in ("1e5", "4608"))
+    tilt, factor = (float(stiff.partition(word)[2].split(". ")[0].split()[0]) for word in (": by ", "K_Hbeta about "))
+    assert tilt == pytest.approx(0.19, rel=0.1)
+    # apart over twice the approach under the mean load
+    assert factor == pytest.approx(1.0 + 0.5 * 1.73 / 4.5, abs=0.06)
+    assert "about 3.2" in soft
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"helical__planet__tilt_stiffness": "1.844326e7 N m/rad"},  # as printed: 1 urad
+        {"helical__helix_angle": "3 deg", "ring__outer_radius": "80 mm"},
+        {"static__slices": 25},  # static.nc has K_Hbeta, and its own doubt
+        {"material__treatment": None, "material__hardness": None},
+    ],
+)
+def test_safeties_without_such_tilts_are_not_doubted_by_them(changes):
+    assert not thrust_findings(**changes)

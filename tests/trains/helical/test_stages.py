@@ -13,7 +13,9 @@ from femgear.case.gear_set import planetary_set
 from femgear.errors import CaseError
 from femgear.gears.iso6336_stiffness import mesh_stiffness_method_b
 from femgear.run import grid_cache, run_case
+from femgear.stages.judgements import STRONG, SURE
 from femgear.stages.static_results import mean_over_period
+from femgear.stages.train_judgements import set_judgements
 from femgear.storage.results import run_folder
 from femgear.system.system import MeshExcitation
 from femgear.trains.helical.figures import FIGURES, transmission_errors
@@ -26,7 +28,7 @@ from femgear.trains.helical.stages import (
     solve_helical_static,
 )
 from femgear.trains.planar.stages import solve_planar_modes
-from femgear.trains.reading import open_results, parse_case, read_case, to_toml, with_value
+from femgear.trains.reading import open_results, parse_case, read_case, to_toml, with_value, with_values
 from femgear.trains.registry import stages_of as stages_of_case
 from validation.helical import PHASINGS, TABLE_4
 
@@ -425,3 +427,17 @@ def test_slices_show_their_load_per_width(results):
         np.testing.assert_allclose(load[0].mean(), lines[speed, mesh, 0, 0].real / width)
         expected = (lines[speed, mesh, 0] * np.exp(2j * np.pi * np.arange(lines.shape[-1]) * 0.5 / 128)).sum()
         np.testing.assert_allclose(load[0, 0], expected.real / width)
+
+
+def test_cards_of_a_drafted_set_with_safeties_say_that_its_planets_tilt(tmp_path):
+    case_file = tmp_path / "case.toml"
+    cli.main(["new", "helical", "-o", str(case_file)])
+    material = {"material.treatment": "case hardened steel", "material.hardness": 700, "static.positions": 16}
+    stiff = {"helical.planet.tilt_stiffness": "1e8 N m/rad"}
+    for changes, state in ((material, "look"), (material | stiff, "good")):
+        folder = tmp_path / state
+        with run_folder(folder) as out:
+            run_case(with_values(read_case(case_file), changes), out, only="static")
+        cards = {card.question: card for card in set_judgements(open_results(folder))}
+        assert [cards[question].state for question in (STRONG, SURE)] == [state, state]
+        assert ("planets tilt under thrust" in cards[STRONG].limit) == (state == "look")
