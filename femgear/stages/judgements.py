@@ -8,12 +8,13 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
 
 import numpy as np
 
+from femgear.case.quantities import RPM
 from femgear.case.sections import StrengthSection
 from femgear.findings import CATALOGUE, DOUBT, FAULT, NOTE, Finding, counted, in_words, percent
 from femgear.report.tables import Block, merged_names
@@ -444,18 +445,24 @@ def judge_smoothness(answer: str, results: Any, stages: Sequence[str], remedy: s
     present = [stage for stage in stages if stage in results.stages]
     if not present:
         return Judgement(SMOOTH, "absent", f"at rest: {answer}" if answer else "no motion", remedy)
-    against = list(dict.fromkeys(_against(results, present)))
+    against, passed, beyond = _against(results, present)
     of_motion = [finding for finding in results.findings if not finding.key.startswith("housing")]
     rests_on = f"; {words}" if (words := estimates_words(of_motion)) else ""
-    if not against and any(finding.code == "W-TAIL" and finding.severity == DOUBT for finding in results.findings):
+    if against or passed:
+        begin = "at some speeds " if _several_speeds(results, present) else ""
+        sentences = [f"{begin}{' and '.join(against)}", *passed] if against else passed
+        return _smoothness("look", answer, f"{', '.join((*against, *passed))}{rests_on}", _sentences(sentences))
+    away = {"branch"} if "response" in present else set()
+    if any(f.code == "W-TAIL" and f.severity == DOUBT and f.stage not in away for f in results.findings):
         return _smoothness("look", answer, f"{_FEW_HARMONICS}{rests_on}")
-    if not against and any(finding.code == "W-OPEN" for finding in results.findings):
+    if any(finding.code == "W-OPEN" for finding in results.findings):
         return _smoothness("look", answer, f"a planet carries nothing at some positions{rests_on}")
-    if not against:
-        judged = any("stable" in results[stage] for stage in present)
-        words = "teeth stay in contact, motions are stable" if judged else "teeth stay in contact"
+    judged = any("stable" in results[stage] for stage in present if not (beyond and stage in _SPEEDS_OF))
+    words = "teeth stay in contact, motions are stable" if judged else "teeth stay in contact"
+    if not beyond:
         return _smoothness("good", answer, f"{words}{rests_on}")
-    return _smoothness("look", answer, f"{', '.join(against)}{rests_on}", f"At some speeds {' and '.join(against)}")
+    remarks = [f"in operation {words}", *beyond]
+    return _smoothness("good", answer, f"{'; '.join(remarks)}{rests_on}", _sentences(remarks))
 
 
 def estimates_words(findings: Iterable[Finding]) -> str:
@@ -470,20 +477,99 @@ def _smoothness(state: State, answer: str, words: str, sentence: str = "") -> Ju
     return Judgement(SMOOTH, state, answer or words, words if answer else "", sentence)
 
 
-def _against(results: Any, stages: Sequence[str]) -> Iterator[str]:
-    """List what speaks against a smooth run in findings and results."""
-    codes = {finding.code for finding in results.findings}
-    data = [results[stage] for stage in stages]
-    parted = any("drive_contact" in part and float(part["drive_contact"].min()) < 1.0 for part in data)
-    if parted or codes & {"W-PULL", "W-SEPARATION"}:
-        yield "teeth part"
-    if any("back_contact" in part and float(part["back_contact"].max()) > 0.0 for part in data):
-        yield "teeth press on their back flanks"
-    unstable = any("stable" in part and bool((part["stable"].values == 0).any()) for part in data)
-    if unstable or codes & {"W-UNSTABLE", "W-GROWTH"}:
-        yield "motions are not stable"
+def _sentences(texts: Sequence[str]) -> str:
+    """Join sentences without the full stop of the last one, the first in lower case."""
+    return ". ".join(text if i == 0 else f"{text[0].upper()}{text[1:]}" for i, text in enumerate(texts))
 
 
+def _several_speeds(results: Any, stages: Sequence[str]) -> bool:
+    """Tell whether a run has more speeds of operation than one, or of a branch or a run-up where it has no others."""
+    operating = [stage for stage in stages if stage not in _SPEEDS_OF] or stages
+    return any(results[stage].sizes.get(axis, 1) > 1 for stage in operating for axis in ("speed", "point"))
+
+
+def _against(results: Any, stages: Sequence[str]) -> tuple[list[str], list[str], list[str]]:
+    """List what speaks against a smooth run in findings and results.
+
+    Returns
+    -------
+    against : list of str
+        At speeds of operation, or at speeds that nothing tells.
+    passed, beyond : lists of str
+        On a branch or a run-up up to the highest speed of operation and beyond it, with the range of speeds.
+    """
+    doubted = [finding for finding in results.findings if finding.severity != NOTE]
+    against, passed, beyond = dict[str, None](), list[str](), list[str]()
+    ordered = sorted(stages, key=lambda stage: stage in _SPEEDS_OF)
+    for stage in ordered:
+        data, axis = results[stage], _SPEEDS_OF.get(stage, "")
+        located = axis in data
+        of_all = stage == ordered[0]  # findings of the case and of stages without a range of speeds count once
+        codes = {f.code for f in doubted if f.stage == stage or (of_all and f.stage not in _SPEEDS_OF)}
+        troubles = dict(_troubles(data, codes, data[axis].dims[0] if located else ""))
+        highest = _highest_speed(results, axis)
+        if not located or not math.isfinite(highest):
+            against |= dict.fromkeys(troubles)
+            continue
+        outside = np.abs(data[axis].values) > highest * (1.0 + 1e-9)
+        for part, texts in ((~outside, passed), (outside, beyond)):
+            new = {words: at & part for words, at in troubles.items() if words not in against and (at & part).any()}
+            if new:
+                texts.append(f"{_span(data, stage, np.logical_or.reduce([*new.values()]))} {' and '.join(new)}")
+    return list(against), passed, beyond
+
+
+def _troubles(data: Any, codes: set[str], axis: str) -> Iterator[tuple[str, np.ndarray]]:
+    """Name what a stage has against a smooth run, and where along an axis; everywhere if only a finding tells."""
+
+    def where(name: str, wrong: Callable[[Any], Any]) -> np.ndarray:
+        if name not in data:
+            return np.zeros(data.sizes.get(axis, 1), bool)
+        at = wrong(data[name])
+        return np.atleast_1d(at.any([of_axis for of_axis in at.dims if of_axis != axis]).values)
+
+    parted = where("drive_contact", lambda share: share < 1.0)
+    if codes & {"W-PULL", "W-SEPARATION"} and not parted.any():
+        pulled = where("lowest_force", lambda force: force < 0.0)
+        parted = pulled if pulled.any() else ~parted
+    unstable = where("stable", lambda stable: stable == 0)
+    if codes & {"W-UNSTABLE", "W-GROWTH"} and not unstable.any():
+        unstable = ~unstable
+    back = where("back_contact", lambda share: share > 0.0)
+    for words, at in (
+        ("teeth part", parted),
+        ("teeth press on their back flanks", back),
+        ("motions are not stable", unstable),
+    ):
+        if at.any():
+            yield words, at
+
+
+def _highest_speed(results: Any, name: str) -> float:
+    """Find the highest speed of operation in the unit of a variable; infinite where no stage has it."""
+    of_stages = [results[stage] for stage in ("dynamics", "response") if stage in results.stages]
+    speeds = [float(np.abs(data[name].values).max()) for data in of_stages if name in data]
+    return max(speeds, default=math.inf)
+
+
+def _span(data: Any, stage: str, at: np.ndarray) -> str:
+    """Write the range of the marked points (n,) of a branch or a run-up."""
+
+    def between(values: np.ndarray, form: str) -> str:
+        ends = dict.fromkeys(f"{value:{form}}" for value in (values[at].min(), values[at].max()))
+        return " to ".join(ends)
+
+    if stage == "branch":
+        hertz = between(data["weight_frequency"].values, ",.3g")
+        speeds = between(np.abs(data["carrier_speed"].values) / RPM, ",.4g")
+        text = f"{hertz} Hz of the weight ({speeds} rpm of the carrier)"
+    else:
+        text = f"{between(np.abs(data['speed'].values), ',.4g')} rpm of the run-up"
+    return f"{'from' if ' to ' in text else 'at'} {text}"
+
+
+_SPEEDS_OF = {"branch": "carrier_speed", "runup": "speed"}
+"""Stages that go beyond the speeds of operation, and their variables of these speeds."""
 _FEW_HARMONICS = "mesh forces may change: too few harmonics or side bands were taken"
 """Of a run whose forces a longer excitation would change."""
 VOICES = (("a relaxed", 54.0), ("a normal", 60.0), ("a raised", 66.0), ("a loud", 72.0), ("a very loud", 78.0))

@@ -58,8 +58,9 @@ def set_judgements(results: Any) -> Iterator[Judgement]:
     rated = rate_results(results)
     for judgement in judge_teeth(results, None if rated is None else rated[0]):
         # nothing louder is said of a set without a level
-        smooth = judgement.question == SMOOTH and judgement.state == "good"
-        yield replace(judgement, sentence=f"It runs smoothly: {judgement.limit}") if smooth else judgement
+        smooth = judgement.question == SMOOTH and judgement.state == "good" and not judgement.sentence
+        words = judgement.limit or judgement.answer
+        yield replace(judgement, sentence=f"It runs smoothly: {words}") if smooth else judgement
     yield judge_noise(
         "no level: this kind of case has no housing", _largest_force(results), open_words=_TO_A_HOUSING, computed=False
     )

@@ -7,6 +7,7 @@ import pytest
 import xarray as xr
 
 from femgear import cli
+from femgear.findings import DOUBT, NOTE
 from femgear.trains.gearbox.transient_results import describe_transient, transient_warnings
 from femgear.trains.reading import open_results, read_case, with_value
 from femgear.trains.registry import train_of
@@ -86,6 +87,7 @@ def transient(
     pulling=0.0,
     lost=0.0,
     least=-200.0,
+    settled=-200.0,
 ) -> xr.Dataset:
     """What the summary reads of a run of 2 s: one variant, one mesh."""
     vm, one = ("variant", "mesh"), np.ones((1, 1))
@@ -93,6 +95,7 @@ def transient(
         {
             "mesh_force": (("variant", "time", "mesh"), np.full((1, 3, 1), 1500.0)),
             "least_force": (vm, least * one),
+            "settled_force": (vm, settled * one),
             "largest_force": (vm, 4000.0 * one),
             "pulling": (vm, pulling * one),
             "lost": (vm, lost * one),
@@ -111,6 +114,7 @@ def transient(
             "damping_ratio": 0.02,
             "shaft_of_speed": "a",
             "mesh_mode": 0.0,
+            "settle": 0.6,
         },
     )
 
@@ -152,6 +156,13 @@ def transient(
 def test_what_a_run_says_against_itself(changes, words):
     found = [str(one) for one in transient_warnings(transient(**changes))]
     assert len(found) == len(words) and all(word in text for word, text in zip(words, found))
+
+
+def test_a_pull_before_the_settling_time_alone_is_a_note():
+    (late,) = transient_warnings(transient(pulling=0.25, settled=-1.0))
+    assert late.severity == DOUBT and "settle" not in str(late)
+    (early,) = transient_warnings(transient(pulling=0.25, settled=1.0))
+    assert early.severity == NOTE and "but only before 0.6 s (transient.settle)" in str(early)
 
 
 def test_table_of_a_run_that_keeps_contact_and_of_one_that_loses_it():

@@ -271,6 +271,65 @@ def test_a_run_is_smooth_unless_teeth_part_or_motions_grow():
     assert judge_smoothness("", pulled, ("dynamics",), SPEEDS).answer == "teeth stay in contact"
 
 
+def of_weight(highest, response_back=0.0):
+    """A planar run at one speed with a branch at 600, 1200, .. rpm whose teeth wedge at 1800 and 2400 rpm."""
+    rpm = 600.0 * np.arange(1, 6)
+    branch = {
+        "carrier_speed": ("point", -rpm * np.pi / 30.0),
+        "weight_frequency": ("point", rpm / 60.0),
+        "back_contact": (("point", "mesh"), [[0.0, 0.0], [0.0, 0.0], [0.0, 0.2], [0.1, 0.2], [0.0, 0.0]]),
+        "drive_contact": (("point", "mesh"), np.ones((5, 2))),
+        "stable": ("point", [1, 1, 1, 0, 1]),
+    }
+    response = {
+        "carrier_speed": ("speed", [highest * np.pi / 30.0]),
+        "back_contact": (("speed", "mesh"), [[0.0, response_back]]),
+    }
+    run = Files(response=xr.Dataset(response), branch=xr.Dataset(branch))
+    run.findings = (Finding("W-TAIL", "", "the branch ends short", severity=DOUBT, stage="branch"),)
+    return judge_smoothness("", run, ("response", "branch"), SPEEDS)
+
+
+def test_what_is_beyond_the_speeds_of_operation_is_said_and_leaves_the_run_smooth():
+    span = "rom 30 to 40 Hz of the weight (1,800 to 2,400 rpm of the carrier)"
+    troubles = "teeth press on their back flanks and motions are not stable"
+    beyond = of_weight(1200.0)
+    assert beyond.state == "good"
+    assert beyond.answer == f"in operation teeth stay in contact; f{span} {troubles}"
+    assert beyond.sentence == f"in operation teeth stay in contact. F{span} {troubles}"
+    # up to the highest speed of operation a machine runs through it: 1800 rpm belongs to it, 2400 rpm not
+    passed = of_weight(1800.0)
+    assert passed.state == "look"
+    assert passed.sentence == "at 30 Hz of the weight (1,800 rpm of the carrier) teeth press on their back flanks"
+    assert of_weight(9000.0).sentence == f"f{span} {troubles}"
+    # at the only speed of operation no others are spoken of
+    there = of_weight(1200.0, response_back=0.1)
+    assert (there.state, there.sentence) == ("look", "teeth press on their back flanks")
+
+
+def test_where_flanks_pull_in_a_run_up_is_said():
+    lowest = np.array([[5.0, np.nan], [5.0, 4.0], [5.0, -3.0], [-1.0, 2.0]])
+    speeds = {"speed": [500.0, 1000.0, 1500.0, 2000.0]}
+    runup = xr.Dataset({"lowest_force": (("speed", "stage"), lowest)}, speeds)
+    run = Files(dynamics=xr.Dataset({"level": ("speed", [1.0])}, {"speed": [1000.0]}), runup=runup)
+    run.findings = (Finding("W-PULL", "", "it pulls", stage="runup"),)
+    judgement = judge_smoothness("", run, ("dynamics", "runup"), SPEEDS)
+    span = "1,500 to 2,000 rpm of the run-up"
+    assert (judgement.state, judgement.sentence) == (
+        "good",
+        f"in operation teeth stay in contact. From {span} teeth part",
+    )
+    run["dynamics"] = run["dynamics"].assign_coords(speed=[2000.0])
+    judgement = judge_smoothness("", run, ("dynamics", "runup"), SPEEDS)
+    assert (judgement.state, judgement.sentence) == ("look", f"from {span} teeth part")
+    # a pull at the speed of operation itself
+    run.findings = (Finding("W-PULL", "", "it pulls", stage="dynamics"),)
+    assert judge_smoothness("", run, ("dynamics", "runup"), SPEEDS).sentence == "teeth part"
+    # one before the settling time alone is a note
+    run.findings = (Finding("W-PULL", "", "it pulls", severity=NOTE, stage="transient"),)
+    assert judge_smoothness("", run, ("dynamics", "runup"), SPEEDS).state == "good"
+
+
 @pytest.mark.parametrize(
     ("level", "words"),
     [

@@ -35,7 +35,10 @@ def test_the_error_of_either_kind_of_mesh_is_the_largest(static):
     case = read_case(CASES / "planetary_27_40_108.toml")
     strength, smooth = judge_teeth(Files(case, static=static), None)
     assert (strength.question, strength.state) == (STRONG, "absent")
-    assert (smooth.question, smooth.answer) == (SMOOTH, "transmission error 1.5 and 0.25 µm (sun-planet, planet-ring)")
+    assert (smooth.question, smooth.answer) == (
+        SMOOTH,
+        "at rest: transmission error 1.5 and 0.25 µm (sun-planet, planet-ring)",
+    )
     assert (smooth.state, smooth.limit) == ("absent", BY_ALL_STAGES)  # this run has no motion
     still = case.model_copy(update={"operation": case.operation.model_copy(update={"speeds": ()})})
     *_, smooth = judge_teeth(Files(still, static=static), None)
@@ -96,4 +99,4 @@ def test_the_error_of_helical_meshes_is_that_of_the_slices(static):
     modes = xr.Dataset({"helical_ste": (("mesh", "position"), curve)}, {"mesh": static["mesh"]})
     runs = {"static": static, "modes": modes}, {"static": static}
     answers = [list(judge_teeth(Files(case, **data), None))[-1].answer for data in runs]
-    assert answers == ["transmission error 0.25 and 0.0625 µm (sun-planet, planet-ring)", "no motion"]
+    assert answers == ["at rest: transmission error 0.25 and 0.0625 µm (sun-planet, planet-ring)", "no motion"]

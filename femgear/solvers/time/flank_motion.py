@@ -54,11 +54,12 @@ class Records:
 
     With ``lowpass`` they are low-passed (`Decimator`), so that nothing beyond half their rate appears as
     something else; otherwise they are the motion at these instants as it is. ``progress`` is called with the
-    share of the steps that are done.
+    share of the steps that are done. The motion has settled after ``settle`` [s].
     """
 
     every: int = 1
     lowpass: bool = False
+    settle: float = 0.0
     progress: Callable[[float], object] = lambda share: None
 
 
@@ -90,6 +91,8 @@ class MarchedRun:
         [s]
     extremes : (2, n_meshes) array
         Least and largest force at any step [N], whatever is recorded.
+    settled_least : (n_meshes,) array
+        Least force at any step after the settling time [N]; infinite where no step comes after it.
     pulling : (n_meshes,) array
         Share of the steps with a negative force: of a linear mesh that pulls, or of a back flank that pushes more
         than the drive flank.
@@ -118,6 +121,7 @@ class MarchedRun:
     steps: int
     step: float
     extremes: np.ndarray
+    settled_least: np.ndarray
     pulling: np.ndarray
     lost: np.ndarray
     contact_loss: bool
@@ -171,7 +175,7 @@ def march_flanks(
     turn = FreeTurn(spun, torques, step, speed)
     scheme = FlankScheme.of(spun, step, turn.directions)
     outputs = np.eye(scheme.n) if outputs is None else np.asarray(outputs, float)
-    record = _Record(spun, count, records, outputs, contact_loss=contact_loss)
+    record = _Record(spun, count, records, outputs, step=step, contact_loss=contact_loss)
     with np.errstate(over="ignore", invalid="ignore"):
         motion = _Motion(spun, scheme, turn, start, count, contact_loss)
         balances = _Balances(spun, scheme, turn, motion.state)
@@ -510,7 +514,9 @@ def _rate(growth: float) -> str:
 class _Record:
     """What a run keeps: motions, meshes, rotation."""
 
-    def __init__(self, spun: SpunSystem, count: int, records: Records, outputs: np.ndarray, *, contact_loss: bool):
+    def __init__(
+        self, spun: SpunSystem, count: int, records: Records, outputs: np.ndarray, *, step: float, contact_loss: bool
+    ):
         self.spun, self.every, self.outputs, self.parts = spun, records.every, outputs.T, contact_loss
         rows, meshes = count // self.every + 1, len(spun.meshes)
         widths = [len(outputs), len(outputs), meshes, meshes, 1, 1]
@@ -520,6 +526,7 @@ class _Record:
         self.filled, self.steps = 0, 0
         self.extremes = np.array([np.full(meshes, np.inf), np.full(meshes, -np.inf)])
         self.pulled, self.lost = np.zeros((2, meshes))
+        self.settled_from, self.settled_least = records.settle / step, np.full(meshes, np.inf)
 
     def take(self, first: int, states, block: StepBlock) -> None:
         """Rows of the states and the `StepBlock` of some steps; that of their start with the first one alone."""
@@ -528,6 +535,8 @@ class _Record:
         force = spun.mesh_forces(approach, block.stiffness, block.gap, parts=self.parts)
         touched = spun.touching(approach, block.gap) if self.parts else np.ones((len(force), 1), bool)
         self._count(force[begin:], touched[begin:])
+        settled = first + np.arange(len(force)) >= self.settled_from - 1e-9
+        self.settled_least = np.minimum(self.settled_least, force[settled].min(axis=0, initial=np.inf))
         if self.decimator is None:
             at = (-first % self.every) or self.every if first else 0
             kept = slice(at, None, self.every)
@@ -558,6 +567,7 @@ class _Record:
             "angle": angle[:, 0].copy(),
             "speed": speed[:, 0].copy(),
             "extremes": self.extremes,
+            "settled_least": self.settled_least,
             "pulling": self.pulled / self.steps,
             "lost": self.lost / self.steps,
         }

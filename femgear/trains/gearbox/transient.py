@@ -200,7 +200,7 @@ def integrate(
             speed=model.speed,
             start=transient.start,
             outputs=np.array([model.box.motion[6 * model.box.deflection.model.first[name] + 5] for name in shafts]),
-            records=Records(every, lowpass=lowpass, progress=progress),
+            records=Records(every, lowpass=lowpass, progress=progress, settle=transient.settled),
             contact_loss=transient.contact_loss,
         )
     except (CaseError, ConvergenceError) as error:

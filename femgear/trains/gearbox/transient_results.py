@@ -8,13 +8,13 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from femgear.case.quantities import RPM
-from femgear.findings import Finding
+from femgear.findings import NOTE, Finding
 from femgear.report.tables import Block, pull
 from femgear.solvers.time.flank_motion import BALANCE
 from femgear.solvers.time.low_pass import PASS_BAND
@@ -79,7 +79,7 @@ class TransientResult(StageResult):
     def contents(self) -> Contents:
         """Collect the contents of transient.nc."""
         runs, model = [motion.run for motion in self.motions.values()], self.first.model
-        first, shafts = runs[0], list(self.first.shafts)
+        first, shafts, case = runs[0], list(self.first.shafts), model.box.deflection.model.case
         ratio = np.array([model.ratio[name] for name in shafts])
         torques = model.torques
         torque = np.column_stack([history.at(first.time) for history in torques] or [np.zeros((len(first.time), 0))])
@@ -97,6 +97,13 @@ class TransientResult(StageResult):
                 f"mesh force along the normal; negative {negative}",
             ),
             ("least_force", mesh, lambda r: r.extremes[0], "N", "least mesh force at any step"),
+            (
+                "settled_force",
+                mesh,
+                lambda r: r.settled_least,
+                "N",
+                "least mesh force at any step after the settling time",
+            ),
             ("largest_force", mesh, lambda r: r.extremes[1], "N", "largest mesh force at any step"),
             ("pulling", mesh, lambda r: r.pulling, "1", "share of steps with a negative force"),
             ("lost", mesh, lambda r: r.lost, "1", "share of steps in which no flank touches"),
@@ -140,10 +147,11 @@ class TransientResult(StageResult):
             "steps": first.steps,
             "every": every,
             "contact": "separating" if first.contact_loss else "linear",
-            "damping_ratio": model.box.deflection.model.case.modes.damping_ratio,
+            "damping_ratio": case.modes.damping_ratio,
             "filter": LOW_PASS if every > 1 else "none",
             "shaft_of_speed": model.shaft,
             "mesh_mode": self.mesh_mode,
+            "settle": 0.0 if case.transient is None else case.transient.settled,
         }
         return Contents(variables, coords, attrs)
 
@@ -289,12 +297,16 @@ def bases_of_meshes(model: GearboxInTime) -> list[int]:
 
 
 def transient_warnings(data: xr.Dataset) -> Iterator[Finding]:
-    """List what transient.nc says against itself."""
+    """List what transient.nc says against itself; a pull before the settling time alone is a note."""
     pulling, least = data["pulling"].values, data["least_force"].values
+    # files of former versions do not tell what is before the settling time
+    settled = data["settled_force"].values if "settled_force" in data else least
     for v, variant in enumerate(data["variant"].values):
         if pulling[v].any() and least[v].min() < -_NOTHING and not separating(data):
-            remedy = "transient.contact_loss = true lets them"
-            yield pull(str(variant), data["mesh"].values, least[v], pulling[v], remedy=remedy)
+            remedy, settles = "transient.contact_loss = true lets them", settled[v].min() >= -_NOTHING
+            more = f", but only before {data.attrs['settle']:g} s (transient.settle)" if settles else ""
+            found = pull(str(variant), data["mesh"].values, least[v], pulling[v], more=more, remedy=remedy)
+            yield replace(found, severity=NOTE) if settles else found
     for variant, lost in zip(data["variant"].values, data["lost"].values):
         if names := [str(mesh) for mesh, share in zip(data["mesh"].values, lost) if share >= 1.0]:
             text = f"{variant}: the teeth of {', '.join(names)} never touch and transmit nothing"

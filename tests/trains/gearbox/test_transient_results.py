@@ -80,6 +80,8 @@ def test_speeds_forces_and_angles(results, own):
     full = solve_box_transient(case, solve_deflections(case)).first.run.force[:, 0]
     extremes = (float(data["least_force"][0, 0]), float(data["largest_force"][0, 0]))
     assert extremes == pytest.approx((full.min(), full.max())) and extremes[0] < force.min()
+    settled = full[round(float(data.attrs["settle"]) / data.attrs["step"]) :].min()
+    assert float(data["settled_force"][0, 0]) == pytest.approx(settled) and settled > extremes[0]
     assert float(data["pulling"][0, 0]) == pytest.approx(np.mean(full < 0.0), abs=1e-3)
     assert data.attrs["every"] == 4 and data.attrs["steps"] == 4000
     torque, loads = data["torque"].values, data["load"].values.tolist()
