@@ -7,16 +7,16 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from femgear.case.quantities import RPM
 from femgear.findings import NOTE, Finding
 from femgear.report.tables import Block, pull
-from femgear.solvers.time.flank_motion import BALANCE
+from femgear.solvers.time.flank_motion import BALANCE, MarchedRun
 from femgear.solvers.time.low_pass import PASS_BAND
 from femgear.stages.protocol import StageResult
 from femgear.storage.contents import Contents
@@ -84,47 +84,9 @@ class TransientResult(StageResult):
         torques = model.torques
         torque = np.column_stack([history.at(first.time) for history in torques] or [np.zeros((len(first.time), 0))])
         negative = "on the back flank" if first.contact_loss else "where the linear mesh pulls"
-        time, mesh, moving = ("time",), ("mesh",), ("time", "shaft")
-        of_runs = (
-            ("spin", time, lambda r: r.angle, "rad", "angle of the reference shaft without its deviation"),
-            ("speed", moving, lambda r: r.speed[:, None] * ratio + r.velocity, "rad/s", "speed of rotation"),
-            ("deviation", moving, lambda r: r.motion, "rad", "rotation less that of the rigid gearbox"),
-            (
-                "mesh_force",
-                ("time", "mesh"),
-                lambda r: r.force,
-                "N",
-                f"mesh force along the normal; negative {negative}",
-            ),
-            ("least_force", mesh, lambda r: r.extremes[0], "N", "least mesh force at any step"),
-            (
-                "settled_force",
-                mesh,
-                lambda r: r.settled_least,
-                "N",
-                "least mesh force at any step after the settling time",
-            ),
-            ("largest_force", mesh, lambda r: r.extremes[1], "N", "largest mesh force at any step"),
-            ("pulling", mesh, lambda r: r.pulling, "1", "share of steps with a negative force"),
-            ("lost", mesh, lambda r: r.lost, "1", "share of steps in which no flank touches"),
-            (
-                "growth",
-                (),
-                lambda r: r.growth,
-                "1/s",
-                "mean rate of the logarithm of the free motion: above zero it grows",
-            ),
-            (
-                "gain",
-                (),
-                lambda r: r.gain,
-                "1",
-                "largest growth of the free motion between two instants of the run, as a factor",
-            ),
-        )
         variables = {
             name: (("variant", *dims), [value(run) for run in runs], unit, text)
-            for name, dims, value, unit, text in of_runs
+            for name, dims, value, unit, text in _of_runs(negative, ratio)
         }
         energy, momentum = [run.energy_balance.error for run in runs], [run.momentum for run in runs]
         variables |= {
@@ -154,6 +116,53 @@ class TransientResult(StageResult):
             "settle": 0.0 if case.transient is None else case.transient.settled,
         }
         return Contents(variables, coords, attrs)
+
+
+def _of_runs(
+    negative: str, ratio: np.ndarray
+) -> tuple[tuple[str, tuple[str, ...], Callable[[MarchedRun], Any], str, str], ...]:
+    """List the variables of every motion in time: name, dimensions, value of a `MarchedRun`, unit, words.
+
+    ``negative`` says where forces are negative, ``ratio`` (n_shafts,) are speeds over that of the reference shaft.
+    """
+    time, mesh, moving = ("time",), ("mesh",), ("time", "shaft")
+    return (
+        ("spin", time, lambda r: r.angle, "rad", "angle of the reference shaft without its deviation"),
+        ("speed", moving, lambda r: r.speed[:, None] * ratio + r.velocity, "rad/s", "speed of rotation"),
+        ("deviation", moving, lambda r: r.motion, "rad", "rotation less that of the rigid gearbox"),
+        (
+            "mesh_force",
+            ("time", "mesh"),
+            lambda r: r.force,
+            "N",
+            f"mesh force along the normal; negative {negative}",
+        ),
+        ("least_force", mesh, lambda r: r.extremes[0], "N", "least mesh force at any step"),
+        (
+            "settled_force",
+            mesh,
+            lambda r: r.settled_least,
+            "N",
+            "least mesh force at any step after the settling time",
+        ),
+        ("largest_force", mesh, lambda r: r.extremes[1], "N", "largest mesh force at any step"),
+        ("pulling", mesh, lambda r: r.pulling, "1", "share of steps with a negative force"),
+        ("lost", mesh, lambda r: r.lost, "1", "share of steps in which no flank touches"),
+        (
+            "growth",
+            (),
+            lambda r: r.growth,
+            "1/s",
+            "mean rate of the logarithm of the free motion: above zero it grows",
+        ),
+        (
+            "gain",
+            (),
+            lambda r: r.gain,
+            "1",
+            "largest growth of the free motion between two instants of the run, as a factor",
+        ),
+    )
 
 
 @dataclass(frozen=True)
@@ -305,8 +314,8 @@ def transient_warnings(data: xr.Dataset) -> Iterator[Finding]:
         if pulling[v].any() and least[v].min() < -_NOTHING and not separating(data):
             remedy, settles = "transient.contact_loss = true lets them", settled[v].min() >= -_NOTHING
             more = f", but only before {data.attrs['settle']:g} s (transient.settle)" if settles else ""
-            found = pull(str(variant), data["mesh"].values, least[v], pulling[v], more=more, remedy=remedy)
-            yield replace(found, severity=NOTE) if settles else found
+            warning = pull(str(variant), data["mesh"].values, least[v], pulling[v], more=more, remedy=remedy)
+            yield replace(warning, severity=NOTE) if settles else warning
     for variant, lost in zip(data["variant"].values, data["lost"].values):
         if names := [str(mesh) for mesh, share in zip(data["mesh"].values, lost) if share >= 1.0]:
             text = f"{variant}: the teeth of {', '.join(names)} never touch and transmit nothing"
