@@ -877,13 +877,16 @@ def _helical(data: xr.Dataset) -> Iterator[Finding]:
     couple, width = data["planet_couple"].values, data.attrs["face_width"]
     total = data["mesh_force"].values.reshape(2, *couple.shape).sum(axis=0)
     if tilts := thrust_words(float(couple.max()), float(couple.sum() / total.sum()), width):
-        text = f"{tilts}: bearings are taken to hold planets upright, and K_Hbeta is that of upright planets"
+        text = (
+            f"axial forces tilt every planet with {tilts}: bearings are taken to hold planets upright, and K_Hbeta is "
+            "that of upright planets"
+        )
         remedy = "give the tilt that bearings allow as a lead slope of the planets"
         yield Finding("W-THRUST", "set.helix_angle", text, remedy=remedy)
 
 
 def thrust_words(couple: float, offset: float, width: float) -> str:
-    """Say what couple axial forces put on every planet; empty of one that tilts no more than loads amid the width do.
+    """Write the couple of axial forces on a planet; empty of one that tilts no more than loads amid the width do.
 
     Parameters
     ----------
@@ -896,10 +899,7 @@ def thrust_words(couple: float, offset: float, width: float) -> str:
     """
     if offset <= 0.05 * width:
         return ""
-    return (
-        f"axial forces tilt every planet with up to {couple:.3g} N m, as loads {offset * 1e3:.2g} mm off the middle "
-        "of the width would"
-    )
+    return f"up to {couple:.3g} N m, as loads {offset * 1e3:.2g} mm off the middle of the width would"
 
 
 def _narrow(data: xr.Dataset) -> Finding:

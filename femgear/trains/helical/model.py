@@ -576,7 +576,10 @@ def _thrust_doubts(case: HelicalCase, gears: PlanetarySet) -> Iterator[Finding]:
     factor = max(face_load_factor(*values) for values in zip(apart, force / widths, stiffness, strict=True))
     tilts = thrust_words(couple, offset, float(widths.min()))
     if tilts and factor > _TILTED:
-        text = f"{tilts}: by {1e3 * tilt:.2g} mrad, which makes K_Hbeta about {factor:.2g}. Safeties leave it out"
+        text = (
+            f"axial forces tilt every planet with {tilts}: by {1e3 * tilt:.2g} mrad, which makes K_Hbeta about "
+            f"{factor:.2g}. Safeties leave it out"
+        )
         remedy = (
             "femgear gearbox CASE makes a gearbox, whose K_Hbeta has the tilts of its planets; stiffer pins tilt less"
         )
