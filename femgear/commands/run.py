@@ -144,8 +144,7 @@ def run(
     json
         Print answers, key figures and findings as JSON, and nothing else on standard output (docs/command_line.md).
     """
-    keep_freed_memory()
-    load_scipy()
+    _set_up_process()
     from femgear.run import run_case
     from femgear.storage.files import resumable
     from femgear.storage.results import completed_since_now, run_folder
@@ -159,9 +158,8 @@ def run(
     train, output = train_of(data), output or results_folder(case)
     of_case = warning_lines(train.case_warnings(data), whole=verbose)
     print_warnings(of_case)
-    place = run_folder(output, case=data.source, force=force)
     with resumable(output, completed_since_now(output)):
-        with place as folder, Progress() as progress:
+        with run_folder(output, case=data.source, force=force) as folder, Progress() as progress:
 
             def tell_numbers(results) -> None:
                 """Print what was found, before anything is drawn."""
@@ -205,6 +203,12 @@ def _say_where_results_are(output: Path, *, pictures: bool, verbose: bool) -> No
         say(f"report:  {output / 'report.html'}")
     if not verbose:
         say(f"tables:  femgear report {shlex.quote(str(output))} --verbose")
+
+
+def _set_up_process() -> None:
+    """Make ready what saves a run time before its verdict."""
+    keep_freed_memory()
+    load_scipy()
 
 
 def keep_freed_memory() -> None:
