@@ -57,6 +57,8 @@ _WORDS = {
     "kg m^2": {"kgm^2": "kg m^2"},
     "N m/rad": {"Nm/rad": "N m/rad", "Nmm/rad": "N mm/rad", "kNm/rad": "kN m/rad"},
 }
+_LONGEST_UNIT = 60
+"""Characters of a unit."""
 _SPELLING = str.maketrans({"*": " ", "·": " ", "⋅": " ", "²": "^2", "³": "^3", "μ": "µ"})
 
 
@@ -150,16 +152,16 @@ def to_si(
     """
     if not isinstance(value, str):
         raise _no_text(value, dimension, low, high)
-    example = f'write it as in "{dimension.show(dimension.scale)}"'
     match = _NUMBER.fullmatch(value)
     _check_number(value, dimension.name)
     if not match:
         message = f"{dimension.name} must start with a number"
-        raise CaseError(message, code="E-UNIT", value=value, remedy=example)
+        raise CaseError(message, code="E-UNIT", value=value, remedy=_example(dimension))
     number, unit = float(match[1]), " ".join(match[2].split())
     if not unit:
-        raise CaseError(f"{dimension.name} needs its unit", code="E-UNIT", value=value, remedy=example)
-    factor = _factor(unit, dimension, value, example)
+        raise CaseError(f"{dimension.name} needs its unit", code="E-UNIT", value=value, remedy=_example(dimension))
+    if (factor := _factor(unit, dimension)) is None:
+        raise _wrong_unit(unit, dimension, value)
     inverse = round(1 / factor)
     # 51/1000 is 0.051 to the last digit, 51*0.001 is not.
     number = number / inverse if abs(inverse * factor - 1) < 1e-12 else number * factor
@@ -213,9 +215,8 @@ def _no_text(value: object, dimension: Dimension, low: float, high: float) -> Ca
     if isinstance(value, int | float) and not isinstance(value, bool):
         remedy = _as_text(value, low, high, dimension)
         return CaseError(f"{dimension.name} needs its unit", code="E-UNIT", value=value, remedy=remedy)
-    remedy = f'write it as in "{dimension.show(dimension.scale)}"'
     message = f"{dimension.name} is needed, not {described(value)}"
-    return CaseError(message, code="E-TYPE", value=value, remedy=remedy)
+    return CaseError(message, code="E-TYPE", value=value, remedy=_example(dimension))
 
 
 def _as_text(value: float, low: float, high: float, dimension: Dimension) -> str:
@@ -248,38 +249,57 @@ def _factor_hint(number: float, low: float, high: float, dimension: Dimension, t
     return None
 
 
-def _factor(unit: str, dimension: Dimension, text: str, example: str) -> float:
-    """SI value of one ``unit``, refused unless it has the dimension."""
-    if len(unit) > 60 or not _UNIT.fullmatch(unit):
-        raise CaseError(
-            f"{unit[:60]!a} is not a product of units",
-            code="E-UNIT",
-            value=text,
-            limit="unit names with * / ^ or blanks, without brackets",
-            remedy=_near(unit[:60], dimension, example),
-        )
-    usual = re.sub(r" ?/ ?", "/", " ".join(unit.replace("**", "^").translate(_SPELLING).split()))
-    factors, words = _FACTORS.get(dimension.si, {}), _WORDS.get(dimension.si, {})
-    usual = words.get(usual, usual)
-    if (factor := factors.get(usual)) is not None:
+@functools.lru_cache(maxsize=256)
+def _factor(unit: str, dimension: Dimension) -> float | None:
+    """SI value of one ``unit``, remembered for lists of many speeds; None unless it has the dimension."""
+    if len(unit) > _LONGEST_UNIT or not _UNIT.fullmatch(unit):
+        return None
+    usual = _usual(unit, dimension)
+    if (factor := _FACTORS.get(dimension.si, {}).get(usual)) is not None:
         return factor
     root, expected = _root(usual), _root(dimension.si)
     if root is None or expected is None or root[1] != expected[1]:
-        what = f"{unit!a} is not a unit of {dimension.name.split(' ', 1)[1]}"
-        raise CaseError(
-            what if root else f"unknown unit {unit!a}",
-            code="E-UNIT",
-            value=text,
-            limit=f"units convertible to {dimension.si}",
-            remedy=_near(usual, dimension, example),
-        )
+        return None
     return root[0] / expected[0]
 
 
-def _near(unit: str, dimension: Dimension, example: str) -> str:
+def _usual(unit: str, dimension: Dimension) -> str:
+    """Unit as the table of factors spells it."""
+    usual = re.sub(r" ?/ ?", "/", " ".join(unit.replace("**", "^").translate(_SPELLING).split()))
+    return _WORDS.get(dimension.si, {}).get(usual, usual)
+
+
+def _wrong_unit(unit: str, dimension: Dimension, text: str) -> CaseError:
+    """Make the refusal of a unit that is none, or one of another dimension."""
+    if len(unit) > _LONGEST_UNIT or not _UNIT.fullmatch(unit):
+        return CaseError(
+            f"{unit[:_LONGEST_UNIT]!a} is not a product of units",
+            code="E-UNIT",
+            value=text,
+            limit="unit names with * / ^ or blanks, without brackets",
+            remedy=_near(unit[:_LONGEST_UNIT], dimension),
+        )
+    usual = _usual(unit, dimension)
+    what = f"{unit!a} is not a unit of {dimension.name.split(' ', 1)[1]}"
+    return CaseError(
+        what if _root(usual) else f"unknown unit {unit!a}",
+        code="E-UNIT",
+        value=text,
+        limit=f"units convertible to {dimension.si}",
+        remedy=_near(usual, dimension),
+    )
+
+
+def _example(dimension: Dimension) -> str:
+    """How a quantity of a dimension is written."""
+    return f'write it as in "{dimension.show(dimension.scale)}"'
+
+
+def _near(unit: str, dimension: Dimension) -> str:
     """How a unit is written that none is read from: units with similar names, an example."""
     spelt = {unit_name.lower(): unit_name for names in (_WORDS, _FACTORS) for unit_name in names.get(dimension.si, ())}
     near = [spelt[spelling] for spelling in difflib.get_close_matches(unit.lower(), spelt, n=2)]
+    example = _example(dimension)
     return f"did you mean {' or '.join(near)}? {example}" if near else example
 
 
