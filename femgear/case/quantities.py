@@ -156,10 +156,11 @@ def to_si(
     _check_number(value, dimension.name)
     if not match:
         message = f"{dimension.name} must start with a number"
-        raise CaseError(message, code="E-UNIT", value=value, remedy=_example(dimension))
+        raise CaseError(message, code="E-UNIT", value=value, remedy=f'write it as in "{_one(dimension)}"')
     number, unit = float(match[1]), " ".join(match[2].split())
     if not unit:
-        raise CaseError(f"{dimension.name} needs its unit", code="E-UNIT", value=value, remedy=_example(dimension))
+        message = f"{dimension.name} needs its unit"
+        raise CaseError(message, code="E-UNIT", value=value, remedy=f'write it as in "{_one(dimension)}"')
     if (factor := _factor(unit, dimension)) is None:
         raise _wrong_unit(unit, dimension, value)
     inverse = round(1 / factor)
@@ -216,7 +217,7 @@ def _no_text(value: object, dimension: Dimension, low: float, high: float) -> Ca
         remedy = _as_text(value, low, high, dimension)
         return CaseError(f"{dimension.name} needs its unit", code="E-UNIT", value=value, remedy=remedy)
     message = f"{dimension.name} is needed, not {described(value)}"
-    return CaseError(message, code="E-TYPE", value=value, remedy=_example(dimension))
+    return CaseError(message, code="E-TYPE", value=value, remedy=f'write it as in "{_one(dimension)}"')
 
 
 def _as_text(value: float, low: float, high: float, dimension: Dimension) -> str:
@@ -290,16 +291,16 @@ def _wrong_unit(unit: str, dimension: Dimension, text: str) -> CaseError:
     )
 
 
-def _example(dimension: Dimension) -> str:
-    """How a quantity of a dimension is written."""
-    return f'write it as in "{dimension.show(dimension.scale)}"'
+def _one(dimension: Dimension) -> str:
+    """How one unit of a dimension is written."""
+    return dimension.show(dimension.scale)
 
 
 def _near(unit: str, dimension: Dimension) -> str:
     """How a unit is written that none is read from: units with similar names, an example."""
     spelt = {unit_name.lower(): unit_name for names in (_WORDS, _FACTORS) for unit_name in names.get(dimension.si, ())}
     near = [spelt[spelling] for spelling in difflib.get_close_matches(unit.lower(), spelt, n=2)]
-    example = _example(dimension)
+    example = f'write it as in "{_one(dimension)}"'
     return f"did you mean {' or '.join(near)}? {example}" if near else example
 
 
