@@ -125,6 +125,24 @@ def test_a_loaded_flank_lets_pairs_in_that_it_draws_nearer(gears, bodies):
     assert needed_nearest(found, deep, none)[at[1]] == pytest.approx(expected, rel=1e-9)
 
 
+def test_a_gap_that_bodies_close_by_a_micrometre_more_than_it_is_needs_its_pair(gears, bodies):
+    """Flanks at rest, one window loaded until it draws a pair beside it nearer by its gap and 1 um."""
+    found = contact_candidates(windows(gears, bodies, 1e-9), bodies, np.arange(5))
+    listed = found.setup.listed
+    mesh, row, pair = np.nonzero(~listed.near & np.isfinite(listed.gap))
+    window = int(np.flatnonzero(found.candidate.any(axis=-1)[2])[0])
+    one = np.zeros(found.pair.shape)
+    one[2, window] = 1.0
+    nearer = -yielding(found, one, mesh, row, pair)
+    at = int(np.argmax(nearer))
+    assert nearer[at] > 0.0 and row[at] == 2
+    load = (listed.gap[mesh[at], 2, pair[at]] + 1e-6) / nearer[at]
+    still = np.zeros((len(listed.gap), 5))
+    smallest = listed.gap[mesh, row].min(axis=-1)
+    expected = (load * nearer - smallest)[load * nearer > listed.gap[mesh, row, pair]].max()
+    assert needed_nearest(found, still, load * one)[2] == pytest.approx(expected, rel=1e-9)
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("factors", [(1.05, 1.0), (1.05, 0.5, 1.0, 1.0001, 2.0)])
 def test_candidates_decide_nothing_of_a_twisted_set(grids, factors):

@@ -9,7 +9,7 @@ from contact.test_cycle import STEEL, TORQUE, reference_set
 from femgear.contact.bodies import helical_stiffness, make_bodies, make_sectors
 from femgear.contact.cycle import CycleOptions, walk_mesh_cycle
 from femgear.contact.supports import pin_forces
-from femgear.contact.width_waves import _beside, width_waves
+from femgear.contact.width_waves import _beside, condensed_waves, width_waves
 from femgear.gears.deviations import no_deviations
 from femgear.gears.modifications import FlankForm, LeadCrowning, LeadSlope
 
@@ -48,6 +48,16 @@ def walk(gears, bodies, waves, overlap, *lead, **options):
 @pytest.fixture(scope="module")
 def whole_overlap(gears, bodies, waves):
     return walk(gears, bodies, waves, 1.0)
+
+
+def test_waves_reach_from_one_half_wave_to_the_finest_of_the_slices(gears, waves):
+    """N slices have half waves 1 to N - 1; few of them are computed as they are, none for nothing."""
+    sun = make_sectors(gears, STEEL, flank_elements=4, refine=1.0).gears[0]
+    few = condensed_waves(sun, STEEL, 4, gears.sun.face_width)
+    for computed, slices in ((waves, SLICES), (few, 4)):
+        half_waves = computed.wave_number * gears.sun.face_width / np.pi
+        assert half_waves[[0, -1]] == pytest.approx([1.0, slices - 1.0], rel=1e-12)
+    assert len(few.waves) == len(few.wave_number) == 3
 
 
 @pytest.mark.parametrize("lead", [(), (LeadSlope(10e-6), LeadCrowning(3e-6))])

@@ -50,6 +50,19 @@ def test_errors_of_position_add_to_the_separation_of_a_whole_pair(pair):
     assert plain.near.tolist() == [True, True, True] and held.near.tolist() == [True, False, True]
 
 
+def test_cells_beyond_a_flank_shorter_than_a_window_still_have_nodes_of_their_own(pair):
+    """Both ends of the window and its middle: two at one place would have no parabola through them."""
+    zeta = np.array([0.5 * sum(pair.path)])
+    options = {"width": 4e-4, "cells": 11, "nearest": 5e-6, "line_of_action": False}
+    whole = windows(pair, zeta, **options)
+    roll = whole.roll[0, 0, 1]
+    ends = np.array([roll - 1e-5, roll + 1e-5])
+    limits = np.stack([ends, np.array([0.0, 1.0])])[..., None]
+    short = windows(pair, zeta, limits=limits, **options)
+    arcs = short.roll[0, 0] ** 2 / (2 * pair.base_radius_1)
+    assert np.diff(arcs) == pytest.approx([2e-4, 2e-4], rel=1e-6)
+
+
 def test_windows_reach_over_a_pit_to_both_sides_of_it():
     """By its length to either side, with more cells; those of meshes whose teeth are whole stay."""
     gears, steel = reference_set(), Material(206e9, 0.3, 7850.0)
