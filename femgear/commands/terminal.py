@@ -16,14 +16,18 @@ from femgear.errors import printable
 
 SILENCE = 10.0
 """Longest time without a line where standard error is a file or a pipe [s]."""
-_SCREEN, _LAST_WORDS, _LEAST_ROWS = 45, 3, 1
-"""Lines of a run on a terminal, those of them that say where its results are, and rows left of the longest table."""
+_SCREEN, _LAST_WORDS, _LEAST_ROWS = 45, 3, (6, 1)
+"""Lines of a run on a terminal, those of them that say where its results are, and rows left of the longest table: with
+notes, and without."""
 _MOST_WARNINGS, _WARNING_LINES = 3, 2
 """Warnings of a case, and of its results, that a run shows on a terminal, and lines of each."""
 
 
 class Progress:
-    """Bars on the terminal, or lines where standard error is a file or a pipe; called by the stages."""
+    """Bars on the terminal, or a line every 10 s where standard error is a file or a pipe; called by the stages.
+
+    Bars go when what they show is done: what was found stands on the terminal alone.
+    """
 
     def __enter__(self):
         from rich.console import Console
@@ -45,8 +49,6 @@ class Progress:
 
     def __call__(self, stage: str, done: float = 0.0, total: float = 1.0) -> None:
         """Say that ``done`` of ``total`` steps of a stage are done."""
-        if stage not in self._done and self._bars is None:
-            self._console.print(stage)
         self._first.setdefault(stage, (time.monotonic(), done))
         self._done[stage], self._now = (done, total), stage
         if self._bars is not None:
@@ -56,7 +58,7 @@ class Progress:
 
     @contextlib.contextmanager
     def aside(self) -> Iterator[None]:
-        """Leave the terminal to others in this context; the bars of what comes stand below."""
+        """Leave the terminal to others in this context."""
         if self._bars is not None:
             self._bars.stop()
         yield
@@ -76,6 +78,7 @@ class Progress:
             progress.TimeElapsedColumn(),
             progress.TimeRemainingColumn(),
             console=self._console,
+            transient=True,
         )
         self._bars.start()
 
@@ -127,7 +130,7 @@ def print_blocks(blocks) -> None:
 def print_briefly(blocks, warned: int = 0) -> None:
     """Print blocks in the lines of a screen that so many lines of warnings leave; the first block stays whole.
 
-    Of the longest of the others the last rows go, but for `_LEAST_ROWS`, then its last notes.
+    Of the longest of the others the last rows go first, but for `_LEAST_ROWS`, then its last notes, then more rows.
     """
     from dataclasses import replace
 
@@ -137,8 +140,9 @@ def print_briefly(blocks, warned: int = 0) -> None:
     longest = max(range(len(blocks) > 1, len(blocks)), key=lambda number: len(blocks[number].rows))
     whole = blocks[longest]
     rows, notes = list(whole.rows), list(whole.notes)
-    while (text := _as_text(blocks)).count("\n") > room and (len(rows) > _LEAST_ROWS or notes):
-        (rows if len(rows) > _LEAST_ROWS else notes).pop()
+    least, fewest = _LEAST_ROWS
+    while (text := _as_text(blocks)).count("\n") > room and (len(rows) > fewest or notes):
+        (notes if notes and len(rows) <= least else rows).pop()
         left = len(whole.rows) - len(rows), len(whole.notes) - len(notes)
         texts = [f"{left[0]} more"] * bool(left[0]) + [f"{left[1]} note{'s' * (left[1] > 1)}"] * bool(left[1])
         more = f"{' and '.join(texts)} by --verbose"
@@ -256,7 +260,15 @@ def print_warnings(lines: Iterable[str]) -> None:
 
 
 def room_of_warnings(lines: Sequence[str]) -> int:
-    """Count the lines that warnings take of a terminal: none where standard error is none."""
+    """Count the lines that warnings take of what is read: none where they go elsewhere than standard output."""
     from rich.console import Console
 
-    return len(lines) if Console(stderr=True).is_terminal else 0
+    return len(lines) if Console(stderr=True).is_terminal or _one_stream() else 0
+
+
+def _one_stream() -> bool:
+    """Whether standard output and standard error are one file or pipe."""
+    try:
+        return os.path.sameopenfile(sys.stdout.fileno(), sys.stderr.fileno())
+    except (OSError, ValueError):
+        return False

@@ -74,12 +74,12 @@ def test_progress_tells_per_cent_count_and_time_left(monkeypatch, capsys):
     assert "25 %" in last and "10/40" in last and last.count(":") >= 2 and len(last.rstrip()) <= 80
 
 
-def test_progress_is_one_line_a_stage_in_a_file(capsys):
+def test_progress_of_a_short_command_leaves_nothing_in_a_file(capsys):
     with terminal.Progress() as progress:
         for done in range(3):
             progress("pictures", done, 2)
         progress("sound", 0, 1)
-    assert capsys.readouterr().err.split() == ["pictures", "sound"]
+    assert capsys.readouterr().err == ""
 
 
 def test_progress_is_never_silent_for_long_in_a_file(monkeypatch, capsys):
@@ -88,8 +88,8 @@ def test_progress_is_never_silent_for_long_in_a_file(monkeypatch, capsys):
         progress("pictures", 3, 11)
         time.sleep(0.5)
     lines = capsys.readouterr().err.splitlines()
-    assert lines[0] == "pictures" and len(lines) > 2
-    assert all(line.startswith("pictures, 3 of 11, ") and line.endswith(" s") for line in lines[1:])
+    assert len(lines) > 2
+    assert all(line.startswith("pictures, 3 of 11, ") and line.endswith(" s") for line in lines)
     assert not any("left" in line for line in lines)
 
 
