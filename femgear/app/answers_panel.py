@@ -256,7 +256,7 @@ class AnswersPanel:
         """Show what became known with a stage."""
         messages: list[dict[str, Any]] = [{"what": "fresh", "stage": part["stage"]}]
         if part["sentence"] is not None:
-            judged = {"sentence": part["sentence"], "judgements": part["judgements"]}
+            judged = {name: part[name] for name in ("duty", "sentence", "judgements")}
             messages.append({"what": "judge"} | in_window(judged))
         if part["charts"]:
             given = {name: part[name] for name in ("stage", "charts", "captions")}

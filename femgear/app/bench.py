@@ -168,8 +168,8 @@ class Bench:
         dict
             ``stage``, ``number`` of its result, ``same``, whether that is there already, ``seconds`` that it took,
             ``charts`` and ``captions`` by name, ``names`` of all that it has, None where that is not known,
-            ``sentence`` and ``judgements`` of page one as far as they are known, None where others follow one that is
-            the ``same``, and ``findings``.
+            ``duty``, ``sentence`` and ``judgements`` of page one as far as they are known, no sentence where others
+            follow one that is the ``same``, and ``findings``.
 
         Raises
         ------
@@ -227,6 +227,7 @@ class Bench:
                     "number": number,
                     "same": same,
                     **drawings,
+                    "duty": train.duty(case),
                     "sentence": sentence,
                     "judgements": [asdict(judgement) | {"words": judgement.words} for judgement in judgements],
                     "findings": as_data(by_severity(results.findings)),

@@ -8,8 +8,10 @@ from typing import Any, get_args
 
 from nicegui import events, ui
 
+from femgear.app.form import sentence_of
 from femgear.app.new_case import LABELS, asked_fields
 from femgear.app.session import SUFFIX
+from femgear.errors import FemgearError
 from femgear.gears.gear_steels import Treatment
 from femgear.trains.drafts import KINDS
 
@@ -134,19 +136,26 @@ def ask_name(title: str, label: str, value: str, button: str, done: Callable[[st
     value : str
         Name that is offered.
     done : callable
-        Takes the name, perhaps in the background; False leaves the dialog open.
+        Takes the name, perhaps in the background; what it raises is said beside the name.
     """
     with ui.dialog(value=True) as dialog, ui.card().classes("w-96"):
         ui.label(title).classes("text-lg")
-        name = _input(label, value)
+        name: Any = _input(label, value)
+        name.on_value_change(lambda: setattr(name, "error", None))
 
         async def take() -> None:
-            answer = done(_text(name))
+            try:
+                answer = done(_text(name))
+            except FemgearError as error:
+                said = {"text": error.message, "limit": error.limit, "remedy": error.remedy, "code": error.code}
+                name.error = sentence_of({part: words or "" for part, words in said.items()})
+                return
+            except OSError as error:
+                name.error = str(error)
+                return
+            dialog.close()
             if inspect.isawaitable(answer):
-                dialog.close()
                 await answer
-            elif answer is not False:
-                dialog.close()
 
         _buttons(dialog, button, take)
 

@@ -258,7 +258,7 @@ class Form:
                 field: Any = ui.select(options, value=text, label=words(entry.name), on_change=changed)
             else:
                 field = ui.input(words(entry.name), value=text, on_change=changed).props(
-                    "debounce=300 autocomplete=off"
+                    "debounce=150 autocomplete=off"
                 )
             field.classes("grow").props(f'dense stack-label data-key="{key}"')
             pin = None

@@ -24,6 +24,7 @@ from femgear.app.runs_panel import RunsPanel
 from femgear.app.session import SUFFIX, Session, case_files, first_shown
 from femgear.app.sliders import Sliders
 from femgear.app.worker import Worker, WorkerError, serve_bench
+from femgear.assistant import MOST_TEXT
 from femgear.case import text as case_text
 from femgear.errors import FemgearError
 from femgear.trains.gearbox_of_case import case_in_casing, gearbox_of_case
@@ -44,6 +45,7 @@ iframe { border: 0; width: 100%; flex: 1 1 auto; }
 .q-field__messages { white-space: normal; line-height: 1.2; }
 .q-field__bottom--animated { position: static; transform: none; }
 .q-field--with-bottom { padding-bottom: 2px; }
+.q-notification__actions { color: inherit; }
 #popup { display: none; }
 dialog.ended { margin: auto; max-width: 36rem; padding: 1.5rem; border: 0; border-radius: 4px; }
 dialog.ended h2 { font-size: 1.25rem; line-height: 1.5; font-weight: 600; margin: 0; }
@@ -52,7 +54,7 @@ dialog.ended p, dialog.ended li { margin: 0.5rem 0; overflow-wrap: anywhere; }
 dialog.ended code { user-select: all; background: #8883; padding: 0.1em 0.3em; }
 """
 _KEPT_EVERY = 0.7
-"""Between two looks after what is not saved [s]."""
+"""Between two looks after what is not saved, as what sliders change is not at once [s]."""
 _BEGINS_AFTER = 0.2
 """From the connection of a window to its first case [s]."""
 
@@ -88,6 +90,7 @@ class Window:
                 self._editor()
             with splitter.after, ui.column().classes("w-full h-full no-wrap gap-0"):
                 self._right()
+        ui.on("femgear-too-long", self._too_long)
         ui.timer(_KEPT_EVERY, self._keep)
         client = ui.context.client
         client.on_delete(self._close)
@@ -251,9 +254,14 @@ class Window:
         try:
             self.session.replace(event.value)
         except FemgearError as error:
+            self._text.value = self.session.text
             self._notify(str(error), "negative")
             return
         self._text_changed(by_text=True)
+
+    def _too_long(self, event: events.GenericEventArguments) -> None:
+        """Say that a text was not taken: the connection of a window carries none of millions of characters."""
+        self._notify(f"{event.args} characters were not taken: a case file has up to {MOST_TEXT}", "negative")
 
     def _text_changed(self, *, by_form: bool = False, by_text: bool = False, dragged: bool = False) -> None:
         """Show a changed text everywhere but where it was changed, and ask for an answer to it."""
@@ -261,6 +269,8 @@ class Window:
             self._text.value = self.session.text
         self._show_values(by_form=by_form)
         self._show_state()
+        if not dragged:
+            self._keep()
         self._answers.ask(dragged=dragged)
 
     def _show_values(self, *, by_form: bool = False) -> None:
@@ -423,16 +433,11 @@ class Window:
         offered = self._free_name(self.session.name.removesuffix(SUFFIX))
         ask_name("Save under another name", "Name of the file", offered, "Save", self._saved_as)
 
-    def _saved_as(self, name: str) -> bool:
-        """Save under another name; tells whether that was possible."""
-        try:
-            self.session.save_as(file_name(name))
-        except (FemgearError, OSError) as error:
-            self._notify(str(error), "negative")
-            return False
+    def _saved_as(self, name: str) -> None:
+        """Save under another name."""
+        self.session.save_as(file_name(name))
         self._list_files()
         self._show_state()
-        return True
 
     def _close(self) -> None:
         """End what the window has begun."""
@@ -457,6 +462,7 @@ def _as_gearbox(text: str, name: str, in_casing: bool) -> tuple[str, list[str]]:
 
 
 def _ended_script(folder: Path) -> str:
-    """Script that says what to do where the server of a folder has ended."""
+    """Script that takes no text too long, and says what to do where the server of a folder has ended."""
     command = escape(f"femgear app {shlex.quote(str(folder))}")
-    return f'<script data-command="{command}">\n{_ENDED.read_text("utf-8")}</script>'
+    data = f'data-command="{command}" data-longest="{MOST_TEXT}"'
+    return f"<script {data}>\n{_ENDED.read_text('utf-8')}</script>"

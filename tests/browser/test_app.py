@@ -478,6 +478,52 @@ def test_nothing_is_lost_with_the_server(window, serve, folder):
     assert saved(again, folder)["operation"]["torque"] == "123 N m"
 
 
+def test_what_was_typed_as_the_server_ended_is_kept_or_shown(window, serve, folder):
+    """Within the third of a second that a field waits for more keys, too."""
+    server = serve(folder)
+    tab = window(server)
+    answer_to(tab)
+    unfold(tab, "operation")
+    field(tab, "operation.torque").fill("123 N m")
+    server.end(signal.SIGKILL)
+    ended = tab.get_by_role("dialog", name="The app has ended")
+    ended.wait_for()
+    assert "operation.torque: 123 N m" in ended.inner_text()
+
+
+def test_a_text_too_long_for_a_case_is_not_taken(window, serve, folder):
+    """Three million characters, pasted into the text: they would end the connection of the window."""
+    tab = window(serve(folder))
+    answer_to(tab)
+    tab.get_by_role("tab", name="Text").click()
+    tab.locator(".cm-content").click()
+    tab.locator(".cm-content").evaluate(
+        """(target) => {
+          const clipboardData = new DataTransfer();
+          clipboardData.setData("text/plain", "x".repeat(3e6));
+          target.dispatchEvent(new ClipboardEvent("paste", { clipboardData, bubbles: true, cancelable: true }));
+        }"""
+    )
+    tab.get_by_text("3000000 characters were not taken").wait_for()
+    tab.get_by_text("saved", exact=True).wait_for()
+    assert saved(tab, folder) == tomllib.loads(coarse_case())
+
+
+def test_a_name_that_no_case_can_have_is_refused_beside_it(window, serve, folder):
+    tab = window(serve(folder))
+    answer_to(tab)
+    press(tab, "Save as")
+    dialog = tab.get_by_role("dialog")
+    for name, words in (("../evil", "only files of one folder are at hand"), ("set", "there is such a file")):
+        dialog.get_by_label("Name of the file").fill(name)
+        dialog.get_by_role("button", name="Save").click()
+        dialog.locator(".q-field__messages", has_text=words).wait_for()
+    dialog.get_by_label("Name of the file").fill("other")
+    dialog.get_by_role("button", name="Save").click()
+    dialog.wait_for(state="detached")
+    assert (folder / "other.toml").is_file() and not (folder.parent / "evil.toml").exists()
+
+
 def test_others_are_not_let_in(serve, folder):
     server = serve(folder)
     place = server.address.split("?")[0]

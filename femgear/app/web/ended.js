@@ -1,10 +1,31 @@
-// Says what happened and what to do where the server of this window has ended: it cannot be asked any more.
+// Takes no text that is too long for the connection, and says what happened and what to do where the server of this
+// window has ended: it cannot be asked any more.
 (() => {
-  const { command } = document.currentScript.dataset;
+  const { command, longest } = document.currentScript.dataset;
   const patience = 1500; // a connection that is back as soon as this [ms] is no end
+  const sent = 1000; // what was typed so long before the end [ms] may not have come to the server
+  const typed = new Map(); // text and time of what was typed last, by its label
   let dialog = null;
+  let gone = 0;
 
   const line = (name, text) => Object.assign(document.createElement(name), { textContent: text });
+
+  const refuse = (event) => {
+    const length = (event.clipboardData || event.dataTransfer)?.getData("text").length || 0;
+    if (length <= Number(longest)) return;
+    event.preventDefault();
+    event.stopPropagation();
+    emitEvent("femgear-too-long", length);
+  };
+  ["paste", "drop"].forEach((name) => addEventListener(name, refuse, true));
+
+  addEventListener("input", ({ target }) => {
+    const text = "value" in target ? target.value : getSelection().anchorNode?.parentElement?.closest(".cm-line")?.textContent;
+    const label = target.getAttribute("aria-label") || "the text";
+    typed.set(target.dataset?.key || label, { text, time: Date.now() });
+  }, true);
+
+  const late = () => [...typed].filter(([, { text, time }]) => text && time > gone - sent);
 
   const tell = () => {
     if (dialog) return;
@@ -18,6 +39,7 @@
     dialog.append(
       title,
       line("p", "Nothing is lost: what you changed and did not save is kept beside the case file."),
+      ...late().map(([name, { text }]) => line("p", `Typed last, so look whether it is there: ${name}: ${text}`)),
       steps,
       line("p", "This window can be closed."),
     );
@@ -32,7 +54,10 @@
       setTimeout(watch, 100);
       return;
     }
-    window.socket.on("disconnect", () => setTimeout(() => window.socket.connected || tell(), patience));
+    window.socket.on("disconnect", () => {
+      gone = Date.now();
+      setTimeout(() => window.socket.connected || tell(), patience);
+    });
     window.socket.on("connect", () => {
       dialog?.remove();
       dialog = null;

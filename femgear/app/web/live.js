@@ -12,6 +12,7 @@ live.make = (tag, name, text) => {
 
 // everything that is shown belongs to a former text until its stage has answered again
 live.begin = ({ text, since }) => {
+  document.body.classList.remove("refused");
   document.querySelectorAll("#seen > figure").forEach((figure) => figure.classList.add("former"));
   live.at("cards").classList.add("former");
   live.drafted = "";
@@ -32,9 +33,11 @@ live.end = ({ seconds, text }) => {
   live.drafted = "";
   live.at("state").textContent = text || `computed in ${seconds.toFixed(2)} s`;
   if (!text) live.at("cards").classList.remove("former");
+  document.body.classList.toggle("refused", Boolean(text));
 };
 
-live.judge = ({ sentence, judgements }) => {
+live.judge = ({ duty, sentence, judgements }) => {
+  live.at("duty").textContent = duty;
   live.at("sentence").textContent = sentence;
   const cards = judgements.map((one) => {
     const card = live.make("li", `card ${one.state}`), question = live.make("p", "question", `${one.question} `);
@@ -130,7 +133,7 @@ live.tables = ({ blocks }) => {
   live.at("tables").replaceChildren(...blocks.flatMap(live.table));
 };
 live.clear = () => {
-  live.judge({ sentence: "", judgements: [] });
+  live.judge({ duty: "", sentence: "", judgements: [] });
   live.keep({ names: [] });
   live.space({ model: null });
   live.tables({ blocks: [] });
