@@ -19,7 +19,7 @@ _IDLE = 1e-9
 """Share of the largest torque, or of the largest power, that counts as none."""
 
 
-_LARGE = 1e5
+_LARGE = 1e4
 """Torque from which on it is written in kilonewtons [N m]."""
 
 
