@@ -338,8 +338,8 @@ def judge_lives(
     _, shortest, where = min(lives, key=lambda life: life[1])
     words = f"{where} fails first"
     if math.isinf(shortest):
-        kinds = {name: "tooth" if name == "teeth" else "bearing" for name, *_ in lives}
-        sentence = f"{' and '.join(f'no {kind}' for kind in dict.fromkeys(kinds.values()))} fails under these loads"
+        kinds = dict.fromkeys("teeth" if name == "teeth" else "bearings" for name, *_ in lives)
+        sentence = f"Its {' and '.join(kinds)} last without end under these loads"
     else:
         wanted = f" of the {required:,.0f} h asked for" if required is not None else ""
         sentence = f"It lives {_hours(shortest)}{wanted} ({words})"

@@ -154,9 +154,9 @@ def test_lives_are_judged_by_the_one_asked_for(required, state, words):
 
 def test_lives_without_end_hold_and_none_is_not_judged():
     (judgement,) = judge_lives([("teeth", math.inf, "the root of gear 1")], 100.0)
-    assert judgement.state == "good" and judgement.sentence == "no tooth fails under these loads"
+    assert judgement.state == "good" and judgement.sentence == "Its teeth last without end under these loads"
     everything = [("teeth", math.inf, ""), ("bearings", math.inf, ""), ("planets' bearings", math.inf, "")]
-    assert next(judge_lives(everything, None)).sentence == "no tooth and no bearing fails under these loads"
+    assert next(judge_lives(everything, None)).sentence == "Its teeth and bearings last without end under these loads"
     assert not list(judge_lives([("bearings", math.nan, "")], 100.0))
 
 
