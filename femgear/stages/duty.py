@@ -20,7 +20,7 @@ _IDLE = 1e-9
 
 
 _LARGE = 1e4
-"""Torque from which on it is written in kilonewtons [N m]."""
+"""Torque [N m] and force [N] from which on they are written in kilonewtons."""
 
 
 @dataclass(frozen=True)
@@ -118,6 +118,11 @@ def pair_duty(case: Any) -> str:
     first = ShaftEnd("gear 1", operation.torque, operation.speeds)
     hertz = [case.gear_1.teeth * speed / (2.0 * math.pi) for speed in operation.speeds]
     return duty_sentence((first, ShaftEnd("gear 2", -operation.torque / ratio, speeds)), mesh_words(hertz))
+
+
+def force_words(newtons: float) -> str:
+    """Write a force [N] with four digits, a large one in kilonewtons."""
+    return f"{newtons:.4g} N" if newtons < _LARGE else f"{1e-3 * newtons:.4g} kN"
 
 
 def in_digits(value: float) -> str:

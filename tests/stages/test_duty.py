@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from femgear.stages.duty import ShaftEnd, duty_sentence, in_digits, pair_duty, set_duty
+from femgear.stages.duty import ShaftEnd, duty_sentence, force_words, in_digits, pair_duty, set_duty
 from femgear.trains.reading import read_case, with_values
 from femgear.trains.registry import train_of
 
@@ -73,3 +73,7 @@ def test_a_pair_and_a_gearbox():
     # 72/25 of the pair, 1 + 73/23 of the set whose ring stands
     assert f"ratio {72 / 25 * (1 + 73 / 23):.4g}, teeth mesh at 3,750 Hz and " in text
     assert text.endswith(" Hz, full torque, one of 2 load cases.")
+
+
+def test_large_forces_are_in_kilonewtons():
+    assert force_words(9876.54) == "9877 N" and force_words(88590.0) == "88.59 kN"

@@ -9,6 +9,7 @@ import numpy as np
 
 from femgear.fe.beam import rigid_link
 from femgear.report.tables import Block, tabulate
+from femgear.stages.duty import force_words
 from femgear.trains.gearbox.case_file import GearboxCase
 from femgear.trains.gearbox.casing import CasingModel, bearing_name
 from femgear.trains.gearbox.deflection import Deflection
@@ -92,7 +93,7 @@ def largest_foot_force(data: Any) -> Iterator[tuple[str, str]]:
     size = np.linalg.norm(data["foot_force"].values, axis=2)
     case, foot = np.unravel_index(int(size.argmax()), size.shape)
     where = f"foot {feet[foot]}" + (f", {cases[case]}" if len(cases) > 1 else "")
-    yield "largest foot force", f"{size[case, foot]:.4g} N, {where}"
+    yield "largest foot force", f"{force_words(float(size[case, foot]))}, {where}"
 
 
 def seat_curve(load_case: xr.Dataset, way: int) -> tuple[np.ndarray, np.ndarray, np.ndarray] | None:

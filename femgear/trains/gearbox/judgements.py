@@ -11,6 +11,7 @@ from femgear.case.level_limits import limit_at
 from femgear.case.load_spectrum import required_life
 from femgear.findings import percent
 from femgear.report.tables import Marks, merged_names
+from femgear.stages.duty import in_digits
 from femgear.stages.judgements import (
     Judgement,
     Least,
@@ -45,6 +46,10 @@ _CALM = 1.01
 """Largest mesh force over its mean below which forces do not vary to speak of."""
 _IDLE = 1e-3
 """Mean force of a mesh over the largest force of all up to which it carries nothing that a ratio would tell about."""
+_ACCELERATIONS = ("m/s²", 1.0), ("mm/s²", 1e-3), ("µm/s²", 1e-6)
+"""Units of a level, from the largest, with their sizes [m/s^2]."""
+_LEAST_DIGITS = 0.1
+"""Of a level in the unit that it is written in."""
 _RESPONSES = "dynamics", "runup", "balance", "transient"
 """Stages with motion."""
 _BY_ALL_STAGES = "a run of all stages computes it"
@@ -227,7 +232,7 @@ def _noise(results: Any) -> Judgement:
         sentence += f"; the largest part comes by {main_way(data, sensor)}"
     if "runup" in results.stages and "level" in results.runup:
         sentence += f". Largest of the run-up: {_loudest_of_run_up(results.runup, marks, name)}"
-    open_words = "give sensor.level_limit, or femgear compare sets two runs beside one another"
+    open_words = "sensor.level_limit gives a limit"
     margins = tuple(_margins(results))
     rests_on = estimates_words(results.findings)
     return judge_noise(answer, sentence, resonance, open_words, margins, doubt_words(marks.words), rests_on)
@@ -267,5 +272,8 @@ def _margins(results: Any) -> Iterator[LevelMargin]:
 
 
 def _level(level: float) -> str:
-    """Write a level [m/s^2]."""
-    return f"{level:.3g} m/s²" if level > 0.0 else "silence"
+    """Write a level [m/s^2] in the unit of its size."""
+    if not level > 0.0:
+        return "silence"
+    unit, size = next((unit for unit in _ACCELERATIONS if level >= _LEAST_DIGITS * unit[1]), _ACCELERATIONS[-1])
+    return f"{in_digits(level / size)} {unit}"

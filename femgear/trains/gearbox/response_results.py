@@ -593,7 +593,8 @@ def main_way(data: xr.Dataset, sensor: int) -> str:
     way, name = int(share.argmax()), str(data["path"].values[int(share.argmax())])
     if share[way] > _CANCELS:
         return f"{name}, but {data['path'].values[int(share.argmin())]} takes most of that away"
-    return f"{name} ({percent(share[way])} of the power)"
+    part = percent(share[way]) if share[way] <= 1.0 else "more than all"
+    return f"{name} ({part} of the power)"
 
 
 def line_origin(data: xr.Dataset, line: int) -> str:

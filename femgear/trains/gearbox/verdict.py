@@ -13,6 +13,7 @@ import numpy as np
 
 from femgear.findings import percent
 from femgear.report.tables import Block, Marks, doubtful_excitation, merged_names
+from femgear.stages.duty import force_words
 from femgear.stages.friction_source import friction_rows
 from femgear.stages.heat_results import heat_rows
 from femgear.stages.key_figures import REFERENCE_ACCELERATION
@@ -95,7 +96,7 @@ def _worst_of_deflection(data: Any, marks: Marks) -> Iterator[tuple[str, str]]:
         force = np.hypot(data["radial_force"].values, data["axial_force"].values)
         at = np.unravel_index(int(force.argmax()), force.shape)
         if force[at] > _ROUNDING * np.nanmax(data["mesh_force"].values, initial=0.0):
-            text = marks(f"{force[at]:.4g} N", *_OF_BEARINGS, of=("deflection",))
+            text = marks(force_words(float(force[at])), *_OF_BEARINGS, of=("deflection",))
             yield "largest bearing force", f"{text}, {where(at, bearings)}"
         yield from shortest_life(data, marks)
     yield from largest_foot_force(data)

@@ -11,6 +11,7 @@ from casings import answer_in_a_casing
 from femgear.case.level_limits import LevelPoint
 from femgear.findings import DOUBT, Finding, percent
 from femgear.stages.judgements import QUIET, SMOOTH, STRONG, SURE
+from femgear.trains.gearbox import judgements
 from femgear.trains.gearbox.judgements import gearbox_judgements
 from femgear.trains.gearbox.mode_words import near_mode
 
@@ -173,3 +174,11 @@ def _with(data, **values):
             return SimpleNamespace(values=values[name]) if name in values else data[name]
 
     return Other()
+
+
+@pytest.mark.parametrize(
+    ("level", "words"),
+    [(0.0, "silence"), (16.7, "16.7 m/s²"), (0.152, "0.152 m/s²"), (1.8e-5, "18 µm/s²"), (2e-9, "0.002 µm/s²")],
+)
+def test_levels_are_in_the_unit_of_their_size(level, words):
+    assert judgements._level(level) == words

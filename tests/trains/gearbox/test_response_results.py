@@ -194,6 +194,8 @@ def test_forces_that_a_longer_excitation_changes_are_told():
 
 def test_ways_that_cancel_have_no_share():
     assert main_way(small_response(), 0) == "bearing A (70 % of the power)"
+    opposed = (("speed", "path", "sensor"), [[[-0.2], [1.2]]] * 2)
+    assert main_way(small_response(path_share=opposed), 0) == "bearing B (more than all of the power)"
     cancelling = (("speed", "path", "sensor"), [[[-11.0], [12.0]]] * 2)
     assert main_way(small_response(path_share=cancelling), 0) == "bearing B, but bearing A takes most of that away"
 
