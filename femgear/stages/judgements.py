@@ -281,9 +281,7 @@ def judge_strength(
         f"{symbol} {least.value:.2f} {_AGAINST[symbol]} ({least.where})" for symbol, least, _ in rated
     )
     margin = _load_margin(rated)
-    limit = (
-        f"{' and '.join(f'{symbol} at least {required:g}' for symbol, _, required in rated)}, ISO 6336:{limits.edition}"
-    )
+    limit = f"{_asked_for(rated, limits)}, ISO 6336:{limits.edition}"
     limit += f", reached at {margin:.2g} times the load" if math.isfinite(margin) else ""
     whole = [] if len(rated) == 2 else ["S_H" if rated[0][0] == "S_F" else "S_F"]
     missing = _not_rated([*whole, *(part for part in unrated if not part.startswith(tuple(whole)))])
@@ -301,6 +299,13 @@ def judge_strength(
         return Judgement(STRONG, "look", answer, limit, rated_words)
     sentence = f"{begin} for {margin:.2g} times the load: {in_sentence}"
     return Judgement(STRONG, "look" if reasons else "good", answer, limit, sentence)
+
+
+def _asked_for(rated: Sequence[tuple[str, Least, float]], limits: StrengthSection) -> str:
+    """Write the safeties that are asked for, and that it is femgear that asks where the case does not."""
+    if limits.model_fields_set & {"required_root_safety", "required_flank_safety"}:
+        return " and ".join(f"{symbol} at least {required:g}" for symbol, _, required in rated)
+    return f"{' and '.join(symbol for symbol, *_ in rated)} at least 1, as the case asks for no other"
 
 
 def _load_margin(rated: Sequence[tuple[str, Least, float]]) -> float:

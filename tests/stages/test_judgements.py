@@ -39,6 +39,8 @@ def test_safeties_are_judged_by_those_asked_for():
     assert holds.state == "good" and holds.limit == (
         "S_F at least 1.4 and S_H at least 1, ISO 6336:2019, reached at 1.4 times the load"
     )
+    without = judge_strength(ROOT, FLANK, StrengthSection())
+    assert without.limit.startswith("S_F and S_H at least 1, as the case asks for no other, ISO 6336:2019")
     assert holds.sentence == (
         "Strong enough for 1.4 times the load: S_F 1.92 against breakage (root of the planet), "
         "S_H 1.21 against pitting (flank of the sun)"

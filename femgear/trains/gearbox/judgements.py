@@ -149,8 +149,8 @@ def _load_case(results: Any) -> str:
 
 
 def _motion(results: Any) -> str:
-    """Write the largest transmission error and the largest mesh force over its mean."""
-    parts = []
+    """Write the largest transmission error and the largest mesh force over its mean, each with its load case."""
+    parts, cases = [], results.case.operation.load_case
     if "deflection" in results.stages:
         for name, words, factor, unit in (
             ("transmission_error", "transmission error", 1e6, " µm"),
@@ -158,17 +158,24 @@ def _motion(results: Any) -> str:
         ):
             values = results.deflection[name].values if name in results.deflection else np.array([np.nan])
             if np.isfinite(values).any():
-                parts.append(f"{words} {factor * np.nanmax(values):.3g}{unit}")
+                where = cases[int(np.unravel_index(int(np.nanargmax(values)), values.shape)[0])].name
+                parts.append((f"{words} {factor * np.nanmax(values):.3g}{unit}", where))
     if "dynamics" in results.stages:
         factors = results.dynamics["dynamic_factor"].values
         if np.isfinite(factors).any():
-            parts.append(f"dynamic factor K_v {np.nanmax(factors):.2f}{_longer(results)}{_load_case(results)}")
+            parts.append(
+                (f"dynamic factor K_v {np.nanmax(factors):.2f}{_longer(results)}", results.case.load_case.name)
+            )
     elif "balance" in results.stages:
         mean, largest = (results.balance[name].values for name in ("mean_force", "largest_force"))
         carries = mean > _IDLE * largest.max()
         if carries.any():
-            parts.append(f"largest mesh force {(largest[carries] / mean[carries]).max():.3f} of its mean")
-    return ", ".join(parts)
+            text = f"largest mesh force {(largest[carries] / mean[carries]).max():.3f} of its mean"
+            parts.append((text, results.case.load_case.name))
+    # what follows in the same load case has its name once, at the end
+    ends = [where != following for (_, where), (_, following) in zip(parts, [*parts[1:], ("", "")], strict=True)]
+    named = [f"{text} ({where})" if end and len(cases) > 1 else text for (text, where), end in zip(parts, ends)]
+    return ", ".join(named)
 
 
 def _longer(results: Any) -> str:

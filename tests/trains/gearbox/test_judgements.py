@@ -87,7 +87,7 @@ def with_limit(results, factor: float, change: float = 0.0, findings=()):
     # without modes there is no resonance, which deserves a look below a limit too
     limited = Files(**vars(results) | {"stages": ("dynamics", "runup")})
     highest = factor * max(float(data["level"].values[:, 0].max()) for data in (results.dynamics, results.runup))
-    entries = ("strength", "pair", "planetary", "operation", "losses")
+    entries = ("strength", "pair", "planetary", "operation", "load_case", "losses")
     limited.case = SimpleNamespace(
         **{entry: getattr(results.case, entry) for entry in entries},
         sensor=(SimpleNamespace(name=sensor, level_limit=(LevelPoint(level=f"{highest:.17g} m/s^2"),)),),
@@ -182,3 +182,21 @@ def _with(data, **values):
 )
 def test_levels_are_in_the_unit_of_their_size(level, words):
     assert judgements._level(level) == words
+
+
+def test_each_number_of_the_motion_names_its_load_case_and_neighbours_of_one_case_once(results):
+    """The error is largest in the first of two load cases, K_Hbeta in the second, the response is of the first."""
+    two = Files(**vars(results))
+    cases = tuple(SimpleNamespace(name=name) for name in ("full", "coast"))
+    two.case = SimpleNamespace(operation=SimpleNamespace(load_case=cases), load_case=cases[0])
+    two.deflection = xr.Dataset(
+        {
+            "transmission_error": (("load_case", "mesh"), [[2e-6, 1e-6], [1e-6, 1e-6]]),
+            "face_load_factor": (("load_case", "mesh"), [[1.1, 1.1], [1.2, 1.3]]),
+        }
+    )
+    text = judgements._motion(two)
+    assert text.startswith("transmission error 2 µm (full), face load factor K_Hβ 1.3 (coast), dynamic factor K_v ")
+    assert text.endswith(" (full)")
+    two.deflection["face_load_factor"][0, 0] = 1.4
+    assert judgements._motion(two).startswith("transmission error 2 µm, face load factor K_Hβ 1.4, dynamic factor")
