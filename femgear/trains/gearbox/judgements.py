@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 import numpy as np
@@ -36,7 +36,7 @@ from femgear.stages.judgements import (
 from femgear.stages.strength import OF_ROOTS
 from femgear.stages.strength_results import SYMBOLS, taken_as_one
 from femgear.stages.tooth_faults import fault_words
-from femgear.trains.gearbox.case_file import teeth_of
+from femgear.trains.gearbox.case_file import PairSection, teeth_of
 from femgear.trains.gearbox.mode_words import near_mode
 from femgear.trains.gearbox.response_results import OF_BOX_RESPONSE, line_origin, main_way
 from femgear.trains.gearbox.silence import silence_words
@@ -88,7 +88,7 @@ def _strength(results: Any) -> Judgement:
     case, data = results.case, results.deflection
     response = results.dynamics if "dynamics" in results.stages else None
     smallest = {kind: least_safety(data, response, symbol) for kind, symbol in (("root", "S_F"), ("flank", "S_H"))}
-    root, flank = (least_over_life(data, kind, _least(safety, data)) for kind, safety in smallest.items())
+    root, flank = (least_over_life(data, kind, _least(safety, data, case.pair)) for kind, safety in smallest.items())
     missing = {*str(data.attrs.get("iso_missing", "")).split()}
     shown = [(least, smallest[kind]) for kind, least in (("root", root), ("flank", flank)) if least is not None]
     chosen = -1 if response is None else int(data.attrs["load_case"])
@@ -126,12 +126,22 @@ def _listed(data: Any, name: str) -> list[str]:
     return [text for text in str(data.attrs.get(name, "")).split(" | ") if text]
 
 
-def _least(safety: tuple[float, tuple[int, int, int]] | None, data: Any) -> Least | None:
+def _of_shafts(flank: str, pairs: Sequence[PairSection]) -> str:
+    """Name the gear of a pair by the shafts after which the pair is named; others as they are."""
+    for pair in pairs:
+        first, second = pair.shafts
+        if pair.name == f"{first}-{second}":
+            flank = flank.replace(f"gear 1 of {pair.name}", f"{first} in mesh with {second}")
+            flank = flank.replace(f"gear 2 of {pair.name}", f"{second} in mesh with {first}")
+    return flank
+
+
+def _least(safety: tuple[float, tuple[int, int, int]] | None, data: Any, pairs: Sequence[PairSection]) -> Least | None:
     """Name the flank of the smallest safety, and its load case where there are several."""
     if safety is None:
         return None
     value, (case, mesh, gear) = safety
-    where = str(data["iso_flank"].values[mesh, gear])
+    where = _of_shafts(str(data["iso_flank"].values[mesh, gear]), pairs)
     return Least(value, where if data.sizes["load_case"] == 1 else f"{where}, {data['load_case'].values[case]}")
 
 
