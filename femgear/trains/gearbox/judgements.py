@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from itertools import groupby
+from operator import itemgetter
 from typing import Any
 
 import numpy as np
@@ -183,9 +185,8 @@ def _motion(results: Any) -> str:
             text = f"largest mesh force {(largest[carries] / mean[carries]).max():.3f} of its mean"
             parts.append((text, results.case.load_case.name))
     # what follows in the same load case has its name once, at the end
-    ends = [where != following for (_, where), (_, following) in zip(parts, [*parts[1:], ("", "")], strict=True)]
-    named = [f"{text} ({where})" if end and len(cases) > 1 else text for (text, where), end in zip(parts, ends)]
-    return ", ".join(named)
+    groups = [(where, [text for text, _ in group]) for where, group in groupby(parts, key=itemgetter(1))]
+    return ", ".join(f"{', '.join(texts)} ({where})" if len(cases) > 1 else ", ".join(texts) for where, texts in groups)
 
 
 def _longer(results: Any) -> str:

@@ -200,6 +200,8 @@ def test_each_number_of_the_motion_names_its_load_case_and_neighbours_of_one_cas
     assert text.endswith(" (full)")
     two.deflection["face_load_factor"][0, 0] = 1.4
     assert judgements._motion(two).startswith("transmission error 2 µm, face load factor K_Hβ 1.4, dynamic factor")
+    two.stages = ()
+    assert judgements._motion(two) == ""
 
 
 def test_gears_of_pairs_named_after_their_shafts_have_the_names_of_these():
