@@ -514,7 +514,8 @@ def _against(results: Any, stages: Sequence[str]) -> tuple[list[str], list[str],
         troubles = dict(_troubles(data, codes, data[axis].dims[0] if located else ""))
         highest = _highest_speed(results, axis)
         if not located or not math.isfinite(highest):
-            against |= dict.fromkeys(troubles)
+            where = "in the motion in time " if stage == "transient" else ""
+            against |= dict.fromkeys(f"{where}{words}" for words in troubles if words not in against)
             continue
         outside = np.abs(data[axis].values) > highest * (1.0 + 1e-9)
         for part, texts in ((~outside, passed), (outside, beyond)):
