@@ -193,7 +193,7 @@ class FemgearError(Exception):
     def __str__(self) -> str:
         lines = [f"[{self.code}] {': '.join(part for part in (self.file, self.key, self.message) if part)}"]
         if self.value is not None:
-            lines.append(f"  found:   {_one_line(self.value)}")
+            lines.append(f"  found:   {one_line(self.value)}")
         if self.limit:
             lines.append(f"  allowed: {self.limit}")
         if self.remedy:
@@ -224,7 +224,8 @@ def printable(text: str) -> str:
     return "".join(c if c.isprintable() else c.encode("unicode_escape", "surrogatepass").decode() for c in text)
 
 
-def _one_line(value: object, limit: int = 120) -> str:
+def one_line(value: object, limit: int = 120) -> str:
+    """Write a value in one line of a message, cut where it is longer than ``limit`` characters."""
     text = repr(value) if isinstance(value, str) else " ".join(str(value).split())
     text = text.lower() if isinstance(value, bool) else text
     return text if len(text) <= limit else text[: limit - 3] + "..."

@@ -19,6 +19,8 @@ from femgear.trains.reading import case_schema
 
 _HELP = Path(__file__).with_name("help.json")
 _EMPTY = ""
+_DEBOUNCE = 80
+"""Wait of a field for more keys, before its text is sent and kept [ms]."""
 
 
 @cache
@@ -143,6 +145,13 @@ class Form:
             self._mark(key, entry, field)
         self._mark_folds()
 
+    def refuse(self, key: str, text: str) -> bool:
+        """Say beside a field that what was typed is not taken; tells whether there is such a field."""
+        if key not in self._fields:
+            return False
+        self._fields[key][1].error = text
+        return True
+
     def _mark_folds(self) -> None:
         """Show in which folds something is said of an entry."""
         for key, fold in self._folds.items():
@@ -258,7 +267,7 @@ class Form:
                 field: Any = ui.select(options, value=text, label=words(entry.name), on_change=changed)
             else:
                 field = ui.input(words(entry.name), value=text, on_change=changed).props(
-                    "debounce=150 autocomplete=off"
+                    f"debounce={_DEBOUNCE} autocomplete=off"
                 )
             field.classes("grow").props(f'dense stack-label data-key="{key}"')
             pin = None

@@ -210,6 +210,10 @@ _IN_WINDOW = {
 """What one does in the window in place of a command."""
 _COMMAND = re.compile(rf"`?\bfemgear ({'|'.join(_IN_WINDOW)})\b(?: (?:CASE|FILE)\b)?`?(?! -)")
 
+_WORDLESS = re.compile(r"(<(?:script|style|pre|code)\b.*?</(?:script|style|pre|code)>)", re.DOTALL)
+"""What of a page is not read as words."""
+_WORDS = re.compile(r">[^<]+<")
+
 
 def in_window(said: Any) -> Any:
     """Name what one does in the window in place of commands, in a text or in all of those of a list or table."""
@@ -218,6 +222,16 @@ def in_window(said: Any) -> Any:
     if isinstance(said, Mapping):
         return {name: in_window(part) for name, part in said.items()}
     return [in_window(part) for part in said] if isinstance(said, (list, tuple)) else said
+
+
+def page_in_window(page: str) -> str:
+    """Name what one does in the window in place of commands, in the words of a page but not in its scripts."""
+    parts = _WORDLESS.split(page)
+    return "".join(part if number % 2 else _WORDS.sub(_spoken, part) for number, part in enumerate(parts))
+
+
+def _spoken(match: re.Match[str]) -> str:
+    return in_window(match[0])
 
 
 def typed_value(entry: Entry, text: str) -> Any:
@@ -253,7 +267,7 @@ def _as_toml(text: str) -> Any:
     """Read a list or table as the file writes it, or leave the text as it is."""
     try:
         return tomllib.loads(f"value = {text}")["value"]
-    except (tomllib.TOMLDecodeError, RecursionError):
+    except (ValueError, RecursionError):  # no TOML, or an integer of thousands of digits
         return text
 
 

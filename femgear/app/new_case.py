@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from femgear.app.form import sentence_of
-from femgear.errors import CaseError, FemgearError
+from femgear.errors import CaseError, FemgearError, one_line
 from femgear.trains.drafts import KINDS, NamedSteel, ToothForm, new_case
 from femgear.trains.planets_draft import PLANET_KINDS
 from femgear.trains.reading import parse_case
@@ -108,11 +108,12 @@ def _read(kind: str, field: str, written: str) -> Any:
         try:
             numbers.append(number(part))
         except ValueError as error:
-            text, remedy = f"a {what} is needed, not {part!r}", f"write it as in {examples[field]}"
+            text, remedy = f"a {what} is needed, not {one_line(part)}", f"write it as in {examples[field]}"
             raise CaseError(text, code="E-TYPE", limit=f"{what}s", remedy=remedy) from error
     if field == "teeth":
         return tuple(numbers)
-    return int(numbers[0]) if float(numbers[0]).is_integer() else numbers[0]
+    value = numbers[0]
+    return int(value) if isinstance(value, float) and value.is_integer() else value
 
 
 def _draft(kind: str, given: Mapping[str, Any]) -> str:

@@ -14,9 +14,10 @@ from urllib.parse import parse_qs
 
 import uvicorn
 from fastapi import FastAPI
-from fastapi.responses import FileResponse, HTMLResponse
+from fastapi.responses import FileResponse, HTMLResponse, Response
 from nicegui import ui
 
+from femgear.app.form import page_in_window
 from femgear.app.session import Session
 from femgear.app.window import Window
 from femgear.assistant import place_in
@@ -104,11 +105,13 @@ def make_app(folder: Path, cache: Path | None) -> FastAPI:
     def answers() -> str:
         return page
 
-    @application.get("/results/{name:path}")
-    def results(name: str) -> FileResponse:
+    @application.get("/results/{name:path}", response_model=None)
+    def results(name: str) -> Response:
         path = place_in(folder, name)
         if path.suffix not in _SHOWN or not path.is_file():
             raise CaseError("there is no such file", code="E-FILE", key="name", value=name[:100])
+        if path.suffix == ".html":
+            return HTMLResponse(page_in_window(path.read_text("utf-8")))
         return FileResponse(path)
 
     @application.exception_handler(CaseError)

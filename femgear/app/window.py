@@ -160,6 +160,8 @@ class Window:
             with ui.tab_panel(form).classes("p-2"):
                 self._form = Form(self._change_field, self._change_rows, self._pin)
             with ui.tab_panel(text).classes("p-0 h-full"):
+                self._refused = ui.label().classes("text-negative said p-2").props('role="alert"')
+                self._refused.visible = False
                 self._text = ui.codemirror(language="TOML", on_change=self._typed, line_wrapping=True)
                 self._text.classes("w-full h-full")
         self._said = ui.column().classes("w-full gap-1 p-2").style("max-height: 30%; overflow: auto; flex: none")
@@ -255,22 +257,25 @@ class Window:
             self.session.replace(event.value)
         except FemgearError as error:
             self._text.value = self.session.text
-            self._notify(str(error), "negative")
+            self._refused.text, self._refused.visible = str(error), True
             return
+        self._refused.visible = False
         self._text_changed(by_text=True)
 
     def _too_long(self, event: events.GenericEventArguments) -> None:
-        """Say that a text was not taken: the connection of a window carries none of millions of characters."""
-        self._notify(f"{event.args} characters were not taken: a case file has up to {MOST_TEXT}", "negative")
+        """Say beside its field that a text was not taken, as the connection carries none of millions of characters."""
+        said = f"{event.args['length']} characters were not taken: a case file has up to {MOST_TEXT}"
+        if not self._form.refuse(event.args["key"], said):
+            self._refused.text, self._refused.visible = said, True
 
     def _text_changed(self, *, by_form: bool = False, by_text: bool = False, dragged: bool = False) -> None:
         """Show a changed text everywhere but where it was changed, and ask for an answer to it."""
+        if not dragged:  # before all else, as the process may end at any time
+            self._keep()
         if not by_text:
             self._text.value = self.session.text
         self._show_values(by_form=by_form)
         self._show_state()
-        if not dragged:
-            self._keep()
         self._answers.ask(dragged=dragged)
 
     def _show_values(self, *, by_form: bool = False) -> None:

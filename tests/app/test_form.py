@@ -11,6 +11,7 @@ from femgear.app.form import (
     Table,
     in_window,
     keys_of,
+    page_in_window,
     shown_value,
     slider_of,
     table_of_schema,
@@ -192,3 +193,18 @@ def test_places_of_a_slider_are_round_numbers(value, step, moved):
 )
 def test_commands_are_what_one_does_in_the_window(said, words):
     assert in_window([{"text": said, "number": 1.0}]) == [{"text": words, "number": 1.0}]
+
+
+def test_words_of_a_page_name_the_window_and_its_scripts_stay():
+    page = (
+        '<p class="limit">femgear casing CASE gives it one</p><script>"femgear run";</script><code>femgear run</code>'
+    )
+    told = page_in_window(page)
+    assert '<p class="limit">“Gearbox › In a casing” gives it one</p>' in told
+    assert told.endswith('<script>"femgear run";</script><code>femgear run</code>')
+
+
+@pytest.mark.parametrize("kind", ["number", "list", "integer"])
+def test_a_list_with_a_number_of_many_digits_stays_text(kind):
+    typed = f"[{'7' * 100_000}]"
+    assert typed_value(Entry("entry", kind), typed) == typed

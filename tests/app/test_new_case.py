@@ -88,3 +88,11 @@ def test_teeth_that_do_not_go_with_planets_are_no_second_mistake():
 def test_kinds_are_asked_for_what_they_have():
     assert {*LABELS} - {*asked_fields("pair")} == {"planets"}
     assert {*LABELS} - {*asked_fields("planar")} == {"helix"} == {*LABELS} - {*asked_fields("wolfrom")}
+
+
+@pytest.mark.parametrize("field", [name for name in LABELS if name not in ("kind", "name", "treatment")])
+@pytest.mark.parametrize("typed", ["7" * 100_000, "7" * 4000, "x" * 100_000, f"{'7' * 100_000} mm"])
+def test_what_is_typed_at_great_length_is_told_in_short(field, typed):
+    others = {"teeth": "17 37 91", "module": "2 mm", "treatment": "nitrided steel", "hardness": "700"}
+    text, problems = drafted_case("planetary", others | {field: typed})
+    assert text == "" and problems and all(len(words) < 400 for words in problems.values())

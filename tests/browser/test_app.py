@@ -492,9 +492,15 @@ def test_what_was_typed_as_the_server_ended_is_kept_or_shown(window, serve, fold
 
 
 def test_a_text_too_long_for_a_case_is_not_taken(window, serve, folder):
-    """Three million characters, pasted into the text: they would end the connection of the window."""
+    """Three million characters, pasted into a field or the text: they would end the connection of the window."""
     tab = window(serve(folder))
     answer_to(tab)
+    unfold(tab, "operation")
+    before = field(tab, "operation.torque").input_value()
+    field(tab, "operation.torque").press("End")
+    tab.keyboard.insert_text("7" * 3_000_000)
+    tab.locator(".q-field__messages", has_text="3000000 characters were not taken").wait_for()
+    assert field(tab, "operation.torque").input_value() == before
     tab.get_by_role("tab", name="Text").click()
     tab.locator(".cm-content").click()
     tab.locator(".cm-content").evaluate(
@@ -504,7 +510,7 @@ def test_a_text_too_long_for_a_case_is_not_taken(window, serve, folder):
           target.dispatchEvent(new ClipboardEvent("paste", { clipboardData, bubbles: true, cancelable: true }));
         }"""
     )
-    tab.get_by_text("3000000 characters were not taken").wait_for()
+    tab.get_by_role("alert").get_by_text("3000000 characters were not taken").wait_for()
     tab.get_by_text("saved", exact=True).wait_for()
     assert saved(tab, folder) == tomllib.loads(coarse_case())
 

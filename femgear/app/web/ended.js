@@ -8,16 +8,19 @@
   let dialog = null;
   let gone = 0;
 
+  const KEPT = "Nothing is lost: what you changed and did not save is kept beside the case file.";
+  const PERHAPS = "What you changed and did not save is kept beside the case file. What you typed last may be missing there.";
+
   const line = (name, text) => Object.assign(document.createElement(name), { textContent: text });
 
   const refuse = (event) => {
-    const length = (event.clipboardData || event.dataTransfer)?.getData("text").length || 0;
-    if (length <= Number(longest)) return;
+    const given = (event.clipboardData || event.dataTransfer)?.getData("text") || event.data;
+    if (!given || given.length <= Number(longest)) return;
     event.preventDefault();
     event.stopPropagation();
-    emitEvent("femgear-too-long", length);
+    emitEvent("femgear-too-long", { length: given.length, key: event.target.dataset?.key || "" });
   };
-  ["paste", "drop"].forEach((name) => addEventListener(name, refuse, true));
+  ["paste", "drop", "beforeinput"].forEach((name) => addEventListener(name, refuse, true));
 
   addEventListener("input", ({ target }) => {
     const text = "value" in target ? target.value : getSelection().anchorNode?.parentElement?.closest(".cm-line")?.textContent;
@@ -29,6 +32,7 @@
 
   const tell = () => {
     if (dialog) return;
+    const last = late();
     dialog = document.createElement("dialog");
     dialog.className = "ended";
     const title = Object.assign(line("h2", "The app has ended"), { id: "ended" });
@@ -38,8 +42,8 @@
     steps.append(start, line("li", "Open the address that it prints then: it holds a new key. Your changes are there."));
     dialog.append(
       title,
-      line("p", "Nothing is lost: what you changed and did not save is kept beside the case file."),
-      ...late().map(([name, { text }]) => line("p", `Typed last, so look whether it is there: ${name}: ${text}`)),
+      line("p", last.length ? PERHAPS : KEPT),
+      ...last.map(([name, { text }]) => line("p", `Typed last, so look whether it is there: ${name}: ${text}`)),
       steps,
       line("p", "This window can be closed."),
     );
