@@ -18,7 +18,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from femgear.errors import GeometryError
+from femgear.errors import GeometryError, one_line
 from femgear.gears.gear import Gear, is_whole, with_room
 from femgear.gears.pair import AnySet, GearPair, GearSet, zero_backlash_distance, zero_backlash_shift
 from femgear.gears.profile import BasicRack
@@ -320,7 +320,7 @@ def check_planets(planets: int) -> None:
     """Refuse what is no whole number of at least one planet (E-RANGE)."""
     if not is_whole(planets) or not 1 <= planets <= 1000:
         raise GeometryError(
-            f"a planetary set with {planets!r} planets",
+            f"a planetary set with {one_line(planets, 40)} planets",
             code="E-RANGE",
             key="set.planets",
             value=planets,
