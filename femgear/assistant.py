@@ -6,12 +6,16 @@ have a largest size, and case files may not name files outside.
 
 from __future__ import annotations
 
+import asyncio
 import json
 import re
 import subprocess
 import sys
+import threading
+import time
 import tomllib
 from collections.abc import Callable
+from contextvars import ContextVar
 from functools import wraps
 from inspect import signature
 from pathlib import Path
@@ -33,6 +37,10 @@ MOST_FILES = 200
 """Files and folders that are listed."""
 LONGEST_RUN = 3600.0
 """Longest time of a command [s]."""
+_LOOKED_EVERY = 0.2
+"""Between two looks whether a call was cancelled [s]."""
+_CANCELLED = ContextVar[threading.Event | None]("cancelled", default=None)
+"""Set when the call of a tool has ended, whose command ends with it."""
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9 ._-]{0,99}(/[A-Za-z0-9][A-Za-z0-9 ._-]{0,99}){0,4}")
 _OUTSIDE = re.compile(r"^(/|~|\\|[A-Za-z]:[\\/])|(^|[\\/])\.\.([\\/]|$)")
 """Texts that name a place outside of the folder."""
@@ -82,8 +90,7 @@ def check_text(text: str) -> None:
         E-TOML; E-FILE: too long, or files outside.
     """
     if len(text) > MOST_TEXT:
-        limit = f"up to {MOST_TEXT} characters"
-        raise CaseError("the case file is too long", code="E-FILE", value=f"{len(text)} characters", limit=limit)
+        raise _too_long(text)
     try:
         tables = tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
@@ -92,6 +99,11 @@ def check_text(text: str) -> None:
         if _OUTSIDE.search(value):
             remedy = "copy the file into the folder and give its name"
             raise CaseError("files outside are not at hand", code="E-FILE", key=path, value=value[:100], remedy=remedy)
+
+
+def _too_long(text: str) -> CaseError:
+    limit = f"up to {MOST_TEXT} characters"
+    return CaseError("the case file is too long", code="E-FILE", value=f"{len(text)} characters", limit=limit)
 
 
 def _texts(value: Any, path: str = "") -> list[tuple[str, str]]:
@@ -113,18 +125,29 @@ def _new_case_path(folder: Path, name: str) -> Path:
     return path
 
 
+def _run_until_cancelled(arguments: list[str], folder: Path) -> subprocess.CompletedProcess[str]:
+    """Run a process to its end, or to that of the call of the tool; TimeoutExpired after `LONGEST_RUN`."""
+    pipes: Any = {"stdin": subprocess.DEVNULL, "stdout": subprocess.PIPE, "stderr": subprocess.PIPE}
+    cancelled = _CANCELLED.get()
+    with subprocess.Popen(arguments, cwd=folder, text=True, errors="replace", **pipes) as process:
+        end = time.monotonic() + LONGEST_RUN
+        while True:
+            try:
+                printed, messages = process.communicate(timeout=_LOOKED_EVERY)
+                return subprocess.CompletedProcess(arguments, process.returncode, printed, messages)
+            except subprocess.TimeoutExpired:
+                late = time.monotonic() > end
+                if late or (cancelled is not None and cancelled.is_set()):
+                    process.terminate()  # it ends as by Ctrl-C: files stay whole
+                if late:
+                    process.communicate()
+                    raise
+
+
 def command(folder: Path, *arguments: str) -> dict[str, Any]:
     """Run a command of femgear in a folder: exit code, what it printed, as data where that is JSON, and messages."""
     try:
-        done = subprocess.run(
-            [sys.executable, "-m", "femgear", *arguments],
-            cwd=folder,
-            stdin=subprocess.DEVNULL,
-            capture_output=True,
-            text=True,
-            errors="replace",
-            timeout=LONGEST_RUN,
-        )
+        done = _run_until_cancelled([sys.executable, "-m", "femgear", *arguments], folder)
     except subprocess.TimeoutExpired:
         return {"exit_code": 124, "data": None, "messages": f"stopped after {LONGEST_RUN:g} s"}
     try:
@@ -158,11 +181,15 @@ def make_server(folder: Path) -> MCPServer:
         """Tell refusals in their own words, which other exceptions are not."""
 
         @wraps(tool)
-        def refusing(*arguments: Any, **named: Any) -> Any:
+        async def refusing(*arguments: Any, **named: Any) -> Any:
+            cancelled = threading.Event()
+            _CANCELLED.set(cancelled)
             try:
-                return tool(*arguments, **named)
+                return await asyncio.to_thread(tool, *arguments, **named)
             except (FemgearError, OSError, UnicodeError, CommandRefused) as error:
                 raise ToolError(str(error)) from error
+            finally:
+                cancelled.set()
 
         return refusing
 
@@ -223,7 +250,10 @@ def _tools(folder: Path) -> list[Callable[..., Any]]:
 
     def read_case(name: str) -> str:
         """Read a case file, TOML text."""
-        return text_of(name)[:MOST_TEXT]
+        text = text_of(name)
+        if len(text) > MOST_TEXT:
+            raise _too_long(text)
+        return text
 
     def write_case(name: str, text: str) -> str:
         """Write or replace a case file, whose name ends in .toml; check it afterwards."""

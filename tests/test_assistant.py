@@ -6,6 +6,7 @@ import io
 import json
 import subprocess
 import sys
+import threading
 from importlib.util import find_spec
 from pathlib import Path
 
@@ -34,18 +35,14 @@ def commands_run_here(monkeypatch):
     `test_commands_have_exit_code_data_and_messages` has the processes.
     """
 
-    class Here:
-        DEVNULL, TimeoutExpired = subprocess.DEVNULL, subprocess.TimeoutExpired
+    def run_here(command, folder):
+        assert command[:3] == [sys.executable, "-m", "femgear"]
+        printed, messages = io.StringIO(), io.StringIO()
+        with contextlib.chdir(folder), contextlib.redirect_stdout(printed), contextlib.redirect_stderr(messages):
+            code = main(command[3:])
+        return subprocess.CompletedProcess(command, code, printed.getvalue(), messages.getvalue())
 
-        @staticmethod
-        def run(command, *, cwd, **_):
-            assert command[:3] == [sys.executable, "-m", "femgear"]
-            printed, messages = io.StringIO(), io.StringIO()
-            with contextlib.chdir(cwd), contextlib.redirect_stdout(printed), contextlib.redirect_stderr(messages):
-                code = main(command[3:])
-            return subprocess.CompletedProcess(command, code, printed.getvalue(), messages.getvalue())
-
-    monkeypatch.setattr(assistant, "subprocess", Here)
+    monkeypatch.setattr(assistant, "_run_until_cancelled", run_here)
 
 
 def asked(server, *calls):
@@ -204,3 +201,37 @@ def test_the_skill_names_tools_that_there_are(capsys):
     assert text == SKILL.read_text(encoding="utf-8")
     assert all(f"`{name}`" in text for name in ("new", "read_case", "write_case", "check", "run", "compare", "explain"))
     assert main(["mcp", "no/such/folder"]) == 2
+
+
+def test_a_case_file_that_is_too_long_is_not_read_in_part(tmp_path):
+    (tmp_path / "long.toml").write_text(f'title = "{"x" * MOST_TEXT}"')
+    _, ((answer, error),) = asked(make_server(tmp_path), ("read_case", {"name": "long.toml"}))
+    assert error and "the case file is too long" in answer and len(answer) < 300
+
+
+def test_a_cancelled_call_ends_its_process(tmp_path, monkeypatch):
+    """A process that would take a minute, whose end is waited for."""
+    from mcp import Client
+
+    monkeypatch.setattr(assistant, "LONGEST_RUN", 60.0)
+    ended, begun, real = threading.Event(), threading.Event(), assistant._run_until_cancelled
+
+    def sleep(_, folder):
+        begun.set()
+        done = real([sys.executable, "-c", "import time; time.sleep(60)"], folder)
+        if done.returncode != 0:
+            ended.set()
+        return done
+
+    monkeypatch.setattr(assistant, "_run_until_cancelled", sleep)
+
+    async def cancel():
+        async with Client(make_server(tmp_path)) as client:
+            call = asyncio.create_task(client.call_tool("explain", {"code": "E-UNIT"}))
+            assert await asyncio.to_thread(begun.wait, 30)
+            call.cancel()
+            with contextlib.suppress(asyncio.CancelledError):
+                await call
+            return await asyncio.to_thread(ended.wait, 30)
+
+    assert asyncio.run(cancel())
