@@ -89,8 +89,7 @@ def check_text(text: str) -> None:
     CaseError
         E-TOML; E-FILE: too long, or files outside.
     """
-    if len(text) > MOST_TEXT:
-        raise _too_long(text)
+    _whole(text)
     try:
         tables = tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
@@ -101,9 +100,12 @@ def check_text(text: str) -> None:
             raise CaseError("files outside are not at hand", code="E-FILE", key=path, value=value[:100], remedy=remedy)
 
 
-def _too_long(text: str) -> CaseError:
-    limit = f"up to {MOST_TEXT} characters"
-    return CaseError("the case file is too long", code="E-FILE", value=f"{len(text)} characters", limit=limit)
+def _whole(text: str) -> str:
+    """Refuse a text that is too long for a case file (CaseError, E-FILE)."""
+    if len(text) > MOST_TEXT:
+        limit = f"up to {MOST_TEXT} characters"
+        raise CaseError("the case file is too long", code="E-FILE", value=f"{len(text)} characters", limit=limit)
+    return text
 
 
 def _texts(value: Any, path: str = "") -> list[tuple[str, str]]:
@@ -130,18 +132,18 @@ def _run_until_cancelled(arguments: list[str], folder: Path) -> subprocess.Compl
     pipes: Any = {"stdin": subprocess.DEVNULL, "stdout": subprocess.PIPE, "stderr": subprocess.PIPE}
     cancelled = _CANCELLED.get()
     with subprocess.Popen(arguments, cwd=folder, text=True, errors="replace", **pipes) as process:
-        end = time.monotonic() + LONGEST_RUN
+        end, asked_to_end = time.monotonic() + LONGEST_RUN, False
         while True:
             try:
                 printed, messages = process.communicate(timeout=_LOOKED_EVERY)
                 return subprocess.CompletedProcess(arguments, process.returncode, printed, messages)
             except subprocess.TimeoutExpired:
-                late = time.monotonic() > end
-                if late or (cancelled is not None and cancelled.is_set()):
-                    process.terminate()  # it ends as by Ctrl-C: files stay whole
-                if late:
-                    process.communicate()
+                if time.monotonic() > end:
+                    process.kill()
                     raise
+                if cancelled is not None and cancelled.is_set() and not asked_to_end:
+                    process.terminate()  # once: it ends as by Ctrl-C, and files stay whole
+                    asked_to_end = True
 
 
 def command(folder: Path, *arguments: str) -> dict[str, Any]:
@@ -250,10 +252,7 @@ def _tools(folder: Path) -> list[Callable[..., Any]]:
 
     def read_case(name: str) -> str:
         """Read a case file, TOML text."""
-        text = text_of(name)
-        if len(text) > MOST_TEXT:
-            raise _too_long(text)
-        return text
+        return _whole(text_of(name))
 
     def write_case(name: str, text: str) -> str:
         """Write or replace a case file, whose name ends in .toml; check it afterwards."""
