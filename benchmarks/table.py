@@ -38,7 +38,7 @@ MISSED = """## What misses its limit, and why
   processes with two positions a task take 0.75 of the time.
 * **Whole computation**. A second process for the three gears brings 0.84 to 0.77 s.
 * **Run without pictures, first line, script**. Imports are a quarter of the time. The first line comes before the
-  files, in a new folder; the fixed piece of work took 87 ms with this row.
+  files, in a new folder; the fixed piece of work took 89 ms with this row.
 * **Answers after a change**. All positions of a loaded period, some 280, take more than 0.1 s in any way.
 * **Sliders**. Planets that are not alike have three times as many positions to solve, 0.3 s with a pin error. Its draft
   of 24 positions takes 0.13 to 0.16 s. The fixed piece of work took 121 ms with these rows.
