@@ -102,13 +102,20 @@ def set_duty(case: Case) -> str:
     of_members = {member: np.zeros(len(operation.speeds)) for member in share}
     of_members |= {end.name: np.array(end.speeds) for end in ends}
     sun, planet = case.sun.teeth, case.planet.teeth
-    return duty_sentence(ends, mesh_words(planet_motion(of_members["sun"], of_members["carrier"], sun, planet)[1]))
+    hertz = planet_motion(of_members["sun"], of_members["carrier"], sun, planet)[1]
+    return duty_sentence(ends, _mesh_words(hertz, teeth_words([case.helix_angle])))
 
 
-def mesh_words(hertz: Iterable[float]) -> str:
-    """Write how often teeth come into mesh [Hz], from the least to the most often; empty of none."""
+def _mesh_words(hertz: Iterable[float], teeth: str) -> str:
+    """Write how often teeth come into mesh [Hz], from the least to the most often, or of what kind they are."""
     often = sorted({float(f"{abs(value):.6g}") for value in hertz} - {0.0})
-    return f"teeth mesh at {' to '.join(map(in_digits, often[:: max(len(often) - 1, 1)]))} Hz" if often else ""
+    return f"{teeth} mesh at {' to '.join(map(in_digits, often[:: max(len(often) - 1, 1)]))} Hz" if often else teeth
+
+
+def teeth_words(helix_angles: Iterable[float | None]) -> str:
+    """Say whether teeth are spur or helical, by the helix angles of all stages [rad]; None and zero of spur gears."""
+    kinds = {bool(angle) for angle in helix_angles}
+    return "teeth" if len(kinds) != 1 else "helical teeth" if kinds.pop() else "spur teeth"
 
 
 def pair_duty(case: Any) -> str:
@@ -117,7 +124,8 @@ def pair_duty(case: Any) -> str:
     speeds = tuple(ratio * speed for speed in operation.speeds)
     first = ShaftEnd("gear 1", operation.torque, operation.speeds)
     hertz = [case.gear_1.teeth * speed / (2.0 * math.pi) for speed in operation.speeds]
-    return duty_sentence((first, ShaftEnd("gear 2", -operation.torque / ratio, speeds)), mesh_words(hertz))
+    ends = first, ShaftEnd("gear 2", -operation.torque / ratio, speeds)
+    return duty_sentence(ends, _mesh_words(hertz, teeth_words([case.helix_angle])))
 
 
 def force_words(newtons: float) -> str:

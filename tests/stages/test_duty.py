@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from femgear.stages.duty import ShaftEnd, duty_sentence, force_words, in_digits, pair_duty, set_duty
+from femgear.stages.duty import ShaftEnd, duty_sentence, force_words, in_digits, pair_duty, set_duty, teeth_words
 from femgear.trains.reading import read_case, with_values
 from femgear.trains.registry import train_of
 
@@ -57,7 +57,7 @@ def test_a_set_turns_by_willis_and_keeps_its_power():
     power = in_digits(60.0 * 1000.0 * RPM * 1e-3)
     assert (
         set_duty(case) == f"60 N m at 1,000 rpm (sun) make 300 N m at 200 rpm (carrier): {power} kW, ratio 5, "
-        "teeth mesh at 360 Hz."
+        "spur teeth mesh at 360 Hz."
     )
     back = with_values(case, {"operation.torque": "-60 N m"})
     assert set_duty(back).startswith("300 N m at 200 rpm (carrier) make 60 N m at 1,000 rpm (sun): ")
@@ -66,12 +66,20 @@ def test_a_set_turns_by_willis_and_keeps_its_power():
 
 def test_a_pair_and_a_gearbox():
     assert pair_duty(read_case(CASES / "spur_pair.toml")) == (
-        "200 N m at 1,500 rpm (gear 1) make 300 N m at 1,000 rpm (gear 2): 31.4 kW, ratio 1.5, teeth mesh at 600 Hz."
+        "200 N m at 1,500 rpm (gear 1) make 300 N m at 1,000 rpm (gear 2): 31.4 kW, ratio 1.5, spur teeth mesh "
+        "at 600 Hz."
     )
     case = read_case(CASES / "e_axle.toml")
     text = train_of(case).duty(case)
     # 72/25 of the pair, 1 + 73/23 of the set whose ring stands
-    assert f"ratio {72 / 25 * (1 + 73 / 23):.4g}, teeth mesh at 3,750 Hz and " in text
+    assert f"ratio {72 / 25 * (1 + 73 / 23):.4g}, helical teeth mesh at 3,750 Hz and " in text
+    # of spur and helical stages together nothing is said
+    assert [teeth_words(angles) for angles in ([None, 0.0], [0.3, -0.2], [0.3, None], [])] == [
+        "spur teeth",
+        "helical teeth",
+        "teeth",
+        "teeth",
+    ]
     assert text.endswith(" Hz, full torque, one of 2 load cases.")
 
 

@@ -15,7 +15,7 @@ from femgear.case.quantities import RPM
 from femgear.errors import CaseError
 from femgear.report.tables import Block, merged_names, tabulate
 from femgear.stages.drawing_tables import describe_drawing
-from femgear.stages.duty import ShaftEnd, duty_sentence, in_digits
+from femgear.stages.duty import ShaftEnd, duty_sentence, in_digits, teeth_words
 from femgear.stages.protocol import FiguresOf, Progress, Stage, Train, modes_verdict, one_blas_thread, silent
 from femgear.stages.wear import MeshingTeeth
 from femgear.trains.gearbox.balance import (
@@ -216,7 +216,9 @@ def gearbox_duty(case: GearboxCase) -> str:
     frequencies = (abs(frequency) for frequency in flow.mesh_frequency.values() if frequency)
     hertz = [*dict.fromkeys(f"{in_digits(frequency)} Hz" for frequency in frequencies)]
     words = " and ".join(filter(None, (", ".join(hertz[:-1]), *hertz[-1:])))
-    facts = [f"teeth mesh at {words}"] if 0 < len(hertz) <= _MOST_MESHES else []
+    sizes = (teeth_of(stage) or stage.gears for stage in (*case.pair, *case.planetary))
+    helices = [gears.helix_angle for gears in sizes if gears is not None]
+    facts = [f"{teeth_words(helices)} mesh at {words}"] if 0 < len(hertz) <= _MOST_MESHES else []
     facts += [f"{case.load_case.name}, one of {len(load_cases)} load cases"] if load_cases[1:] else []
     return duty_sentence(ends, ", ".join(facts))
 
