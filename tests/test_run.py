@@ -136,14 +136,17 @@ def contents(folder):
 @pytest.mark.parametrize(
     "name", [*list(QUICK)[:1], *(pytest.param(name, marks=pytest.mark.slow) for name in list(QUICK)[1:])]
 )
-def test_an_interrupted_run_goes_on_from_its_stages_to_the_same_bits(name, tmp_path):
+def test_an_interrupted_run_goes_on_from_its_stages_to_the_same_bits(name, tmp_path, monkeypatch):
+    """Of stages one after the other: what is computed beside another one is lost with it."""
+    monkeypatch.setattr("femgear.run.second_core", lambda: False)
     case = quick(name)
-    stages = run(case, tmp_path / "whole")
+    begun = run(case, tmp_path / "whole")
+    # steps of a stage, such as grids, are told by names of their own
+    stages = [name for name in begun if name in read_manifest(tmp_path / "whole").timings]
     with pytest.raises(KeyboardInterrupt):
         run(case, tmp_path / "out", stop=stages[-1])
     left = read_manifest(tmp_path / "out")
-    # what is solved with the parts of another stage does not begin by itself, nor do modes of a gearbox
-    assert not left.complete and [name for name in left.timings if name in stages] == stages[:-1]
+    assert not left.complete and sorted(left.timings) == sorted(stages[:-1])
     with pytest.warns(UserWarning, match=f"{', '.join(left.timings)}: as the run that was interrupted"):
         assert run(case, tmp_path / "out") == stages[-1:]
     assert contents(tmp_path / "out") == contents(tmp_path / "whole")

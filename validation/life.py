@@ -260,7 +260,7 @@ def _safeties(case, data, spectra, hours: np.ndarray, name: str, note: str) -> I
     """Safeties of all roots and flanks over load cases (n,) by hand, in which the first gear turns so often."""
     flanks = data["iso_flank"].values
     for rated in spectra:
-        kind, stage = rated.kind, rated.name.rpartition(" gear ")[0]
+        kind, stage = rated.kind, rated.name.partition(" of ")[2]
         mesh, gear = next((m, g) for m, g in np.ndindex(*flanks.shape) if flanks[m, g] == rated.name)
         safety = data["iso_root_safety" if kind == "root" else "iso_contact_safety"].values[:, mesh, gear]
         wheels = case.pair[[pair.name for pair in case.pair].index(stage)].teeth

@@ -437,7 +437,7 @@ def test_members_that_move_share_better_and_are_told(case, tmp_path):
     path = tmp_path / "pins.toml"
     path.write_text('pin_errors.tangential = { distribution = "normal", sigma = "3 um" }', encoding="utf-8")
     medians = []
-    for members, note in (("fixed", "gear axes fixed"), ("elastic", "planet-ring with the ring on its fou")):
+    for members, note in (("fixed", "gear axes fixed"), ("elastic", "planet-ring with the ring's foundation")):
         one = with_value(case, "static.members", members)
         (block, *_), _ = samples_into(one, tmp_path / members, prepared(one, path, cache=grid_cache()), count=20)
         assert [note in line for line in block.notes].count(True) == 1
