@@ -163,8 +163,8 @@ CATALOGUE = {
     ),
     "W-FACE-LOAD": Meaning(
         DOUBT,
-        "Slices are too wide for the load distribution over the face width.",
-        "coarse load over the width",
+        "The load over the face width is too uneven for its slices, or leaves a part of the width bare.",
+        "uneven load over the width",
         "Take more slices, or stiffer shafts and bearings where the face width lifts.",
     ),
     "W-FAULT": Meaning(

@@ -10,6 +10,8 @@ import math
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
+from itertools import groupby
+from operator import itemgetter
 from typing import Any, Literal
 
 import numpy as np
@@ -293,7 +295,8 @@ def judge_strength(
         )
         return Judgement(STRONG, "bad", answer, limit, f"Not strong enough, for {margin:.2g} times the load: {failing}")
     faulty = "W-FAULT" in doubts and bool(_raised(findings, ("W-FAULT",)))
-    begin = "But for the faulty teeth strong enough" if faulty else "Strong enough"
+    doubted = "With doubts strong" if ", " in reasons else "With a doubt strong" if reasons else "Strong"
+    begin = "But for the faulty teeth strong enough" if faulty else f"{doubted} enough"
     if missing:
         rated_words = f"{begin} as far as it is rated, for {margin:.2g} times the load: {in_sentence}; {missing}"
         return Judgement(STRONG, "look", answer, limit, rated_words)
@@ -395,6 +398,18 @@ def lives_of_bearings(data: Any) -> Iterator[tuple[str, float, str]]:
         yield "planets' bearings", float(life[at]), f"the bearing of {data['planet_bearing'].values[at]}"
 
 
+def figures_in_cases(figures: Iterable[tuple[str, str]]) -> str:
+    """Write figures with their load cases, each in brackets; once where one follows another, empty where none is."""
+    groups = [(case, ", ".join(text for text, _ in group)) for case, group in groupby(figures, key=itemgetter(1))]
+    return ", ".join(f"{texts} ({case})" if case else texts for case, texts in groups)
+
+
+def _load_case_of(data: Any, number: int) -> str:
+    """Name a load case of a file with several; empty where there is one, or speeds in their place."""
+    several = "load_case" in data.coords and data.sizes["load_case"] > 1
+    return str(data["load_case"].values[number]) if several else ""
+
+
 def judge_heat(results: Any) -> Iterator[Judgement]:
     """Judge scuffing and film, with the efficiency; nothing where no losses were computed."""
     if "losses" not in results.stages:
@@ -402,29 +417,32 @@ def judge_heat(results: Any) -> Iterator[Judgement]:
     values = np.asarray(results.losses["efficiency"].values, float)
     loss = np.asarray(results.losses["loss"].values, float)
     unknown = str(results.losses.attrs.get("unknown", ""))
+    figures = list[tuple[str, str]]()
     if unknown:
-        efficiency, sentence = "efficiency not known", f"Nothing tells what the meshes of {unknown} lose"
+        figures.append(("efficiency not known", ""))
+        sentence = f"Nothing tells what the meshes of {unknown} lose"
     elif np.isfinite(values).any():
         at = int(np.nanargmax(loss))
-        efficiency = f"efficiency {100.0 * values[at]:.2f} %, losses {loss[at]:,.0f} W"
-        sentence = f"It loses {loss[at]:,.0f} W"
-        if len(loss) > 1 and "load_case" in results.losses.coords:
-            efficiency += f" ({results.losses['load_case'].values[at]})"
+        lost = f"{loss[at]:,.0f} W", _load_case_of(results.losses, at)
+        figures.append((f"efficiency {100.0 * values[at]:.2f} %, losses {lost[0]}", lost[1]))
+        sentence = f"It loses {figures_in_cases([lost])}"
     else:
         return
-    limits, below = list[str](), list[str]()
+    limits, below = list[tuple[str, str]](), list[tuple[str, str]]()
     if "heat" in results.stages:
         for name, words in (("scuffing_safety", "S_B"), ("film_safety", "S_lambda")):
             safety = np.asarray(results.heat[name].values, float)
             if np.isfinite(safety).any():
-                limits.append(f"{words} {np.nanmin(safety):.2f}")
+                at = int(np.unravel_index(int(np.nanargmin(safety)), safety.shape)[0])
+                limits.append((f"{words} {np.nanmin(safety):.2f}", _load_case_of(results.heat, at)))
                 if not np.nanmin(safety) >= 1.0:
                     below.append(limits[-1])
-        hottest = float(np.nanmax(results.heat["highest_temperature"].values))
-        efficiency += f", contact {hottest:.0f} °C"
-    answer = ", ".join([efficiency, *limits])
+        contact = np.asarray(results.heat["highest_temperature"].values, float)
+        at = int(np.unravel_index(int(np.nanargmax(contact)), contact.shape)[0])
+        figures.append((f"contact {np.nanmax(contact):.0f} °C", _load_case_of(results.heat, at)))
+    answer = figures_in_cases([*figures, *limits])
     if below:
-        yield Judgement(HEAT, "bad", answer, "at least 1", f"{sentence} and its oil fails ({', '.join(below)})")
+        yield Judgement(HEAT, "bad", answer, "at least 1", f"{sentence} and its oil fails: {figures_in_cases(below)}")
     elif limits:
         yield Judgement(HEAT, "good", answer, "at least 1, ISO/TS 6336-20 and -22", sentence)
     else:
@@ -509,8 +527,8 @@ def _against(results: Any, stages: Sequence[str]) -> tuple[list[str], list[str],
     for stage in ordered:
         data, axis = results[stage], _SPEEDS_OF.get(stage, "")
         located = axis in data
-        of_all = stage == ordered[0]  # findings of the case and of stages without a range of speeds count once
-        codes = {f.code for f in doubted if f.stage == stage or (of_all and f.stage not in _SPEEDS_OF)}
+        of_all = stage == ordered[0]  # findings of the case and of stages without motion count once
+        codes = {f.code for f in doubted if f.stage == stage or (of_all and f.stage not in (*stages, *_SPEEDS_OF))}
         troubles = dict(_troubles(data, codes, data[axis].dims[0] if located else ""))
         highest = _highest_speed(results, axis)
         if not located or not math.isfinite(highest):
@@ -521,7 +539,8 @@ def _against(results: Any, stages: Sequence[str]) -> tuple[list[str], list[str],
         for part, texts in ((~outside, passed), (outside, beyond)):
             new = {words: at & part for words, at in troubles.items() if words not in against and (at & part).any()}
             if new:
-                texts.append(f"{_span(data, stage, np.logical_or.reduce([*new.values()]))} {' and '.join(new)}")
+                doubt = f" ({doubt_words([CATALOGUE['W-TAIL'].words])})" if "W-TAIL" in codes else ""
+                texts.append(f"{_span(data, stage, np.logical_or.reduce([*new.values()]))} {' and '.join(new)}{doubt}")
     return list(against), passed, beyond
 
 

@@ -33,6 +33,8 @@ SYMBOLS = {"sharing": "K_gamma", "dynamic": "K_v", "face": "K_Hβ", "transverse"
 """Symbols of the load factors by the names of their arrays."""
 OF_RESPONSE = "W-PULL", "W-TAIL", "W-SEPARATION"
 """Codes of the findings that concern safeties with the K_v of a response."""
+RATED_RESPONSES = "dynamics", "housing", "response"
+"""Stages with speeds of operation, which K_v of safeties is of."""
 _GIVEN_BY = {
     "sharing": "K_γ (a response, or of rigid bodies a static solution)",
     "dynamic": "K_v (a response, or operation.speeds with strength.quality)",
@@ -61,9 +63,9 @@ def strength_verdict(results: Results) -> Iterator[Block]:
         return
     rating, kinds = rated
     rows = [
-        *((name, marks(text, *doubts_of(f"{name} {text}"), *OF_RESPONSE)) for name, text in safety_rows(rating, kinds)),
-        *rows,
-    ]
+        (name, marks(marks(text, *doubts_of(f"{name} {text}")), *OF_RESPONSE, of=RATED_RESPONSES))
+        for name, text in safety_rows(rating, kinds)
+    ] + rows
     yield Block("Verdict", rows=tuple(rows), notes=(*safety_notes(rating), *marks.notes))
     yield strength_block(rating, kinds)
 

@@ -34,6 +34,7 @@ from femgear.stages.static_results import peak_to_peak
 from femgear.stages.strength import OF_ROOTS, Rating
 from femgear.stages.strength_results import (
     OF_RESPONSE,
+    RATED_RESPONSES,
     SYMBOLS,
     computed_dynamic_factor,
     kind_names,
@@ -101,7 +102,7 @@ def judge_teeth(results: Any, rating: Rating | None, dynamic: np.ndarray | None 
         flank,
         case.strength,
         _stresses(results),
-        findings,
+        [f for f in findings if f.code not in OF_RESPONSE or f.stage in ("", *RATED_RESPONSES)],
         (*OF_ROOTS, *(() if all(least.over_life for least in shown) else OF_RESPONSE)),
         taken_as_one(_missing_factors(results, rating, shown)),
         NotRated() if rating is None else _NO_METHOD,

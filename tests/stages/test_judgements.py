@@ -70,7 +70,11 @@ def test_strength_without_limits_is_open_and_half_of_it_deserves_a_look():
     assert half.state == "look" and half.limit.endswith("S_F is not rated")
     doubt = Finding("W-FACE-LOAD", "", "text", severity=DOUBT)
     doubtful = judge_strength(ROOT, FLANK, StrengthSection(), "", [doubt], ["W-FACE-LOAD"])
-    assert doubtful.state == "look" and doubtful.limit.endswith("; doubt: coarse load over the width")
+    assert doubtful.state == "look" and doubtful.limit.endswith("; doubt: uneven load over the width")
+    assert doubtful.sentence.startswith("With a doubt strong enough for 1.5 times the load: ")
+    more = [doubt, Finding("W-THRUST", "", "text", severity=DOUBT)]
+    doubtful = judge_strength(ROOT, FLANK, StrengthSection(), "", more, ["W-FACE-LOAD", "W-THRUST"])
+    assert doubtful.sentence.startswith("With doubts strong enough")
     assert judge_strength(ROOT, FLANK, StrengthSection(), "", [doubt], ["W-THRUST"]).state == "good"
 
 
@@ -220,6 +224,24 @@ def test_efficiency_and_losses_are_those_of_one_load_case():
     losses = xr.Dataset(of_cases, coords={"load_case": ["full torque", "coasting"]})
     (judgement,) = judge_heat(SimpleNamespace(stages=("losses",), losses=losses))
     assert judgement.answer == "efficiency 97.64 %, losses 779 W (full torque)"
+    assert judgement.sentence == "It loses 779 W (full torque)"
+
+
+def test_the_hottest_contact_and_the_least_safety_name_their_load_cases():
+    cases, kinds = ["full torque", "coasting"], ("load_case", "mesh_kind")
+    losses = xr.Dataset({"efficiency": ("load_case", [0.97, 0.96]), "loss": ("load_case", [779.0, 226.6])})
+    values = {
+        "scuffing_safety": [[2.0], [0.8]],
+        "film_safety": [[1.5], [1.4]],
+        "highest_temperature": [[130.0], [90.0]],
+    }
+    heat = xr.Dataset({name: (kinds, array) for name, array in values.items()})
+    losses, heat = (data.assign_coords(load_case=cases) for data in (losses, heat))
+    (judgement,) = judge_heat(SimpleNamespace(stages=("losses", "heat"), losses=losses, heat=heat))
+    assert judgement.answer == (
+        "efficiency 97.00 %, losses 779 W, contact 130 °C (full torque), S_B 0.80, S_lambda 1.40 (coasting)"
+    )
+    assert judgement.sentence == "It loses 779 W (full torque) and its oil fails: S_B 0.80 (coasting)"
 
 
 class Files(dict):
@@ -294,7 +316,8 @@ def of_weight(highest, response_back=0.0):
 
 def test_what_is_beyond_the_speeds_of_operation_is_said_and_leaves_the_run_smooth():
     span = "rom 30 to 40 Hz of the weight (1,800 to 2,400 rpm of the carrier)"
-    troubles = "teeth press on their back flanks and motions are not stable"
+    doubt = " (doubt: too few harmonics)"
+    troubles = f"teeth press on their back flanks and motions are not stable{doubt}"
     beyond = of_weight(1200.0)
     assert beyond.state == "good"
     assert beyond.answer == f"in operation teeth stay in contact; f{span} {troubles}"
@@ -302,7 +325,8 @@ def test_what_is_beyond_the_speeds_of_operation_is_said_and_leaves_the_run_smoot
     # up to the highest speed of operation a machine runs through it: 1800 rpm belongs to it, 2400 rpm not
     passed = of_weight(1800.0)
     assert passed.state == "look"
-    assert passed.sentence == "at 30 Hz of the weight (1,800 rpm of the carrier) teeth press on their back flanks"
+    there = "at 30 Hz of the weight (1,800 rpm of the carrier)"
+    assert passed.sentence == f"{there} teeth press on their back flanks{doubt}"
     assert of_weight(9000.0).sentence == f"f{span} {troubles}"
     # at the only speed of operation no others are spoken of
     there = of_weight(1200.0, response_back=0.1)
@@ -330,6 +354,16 @@ def test_where_flanks_pull_in_a_run_up_is_said():
     # one before the settling time alone is a note
     run.findings = (Finding("W-PULL", "", "it pulls", severity=NOTE, stage="transient"),)
     assert judge_smoothness("", run, ("dynamics", "runup"), SPEEDS).state == "good"
+
+
+def test_teeth_that_part_in_the_motion_in_time_alone_are_said_to_do_so_there():
+    """The response at a speed pulls nowhere: its forces stay above zero."""
+    run = Files(dynamics=xr.Dataset({"lowest_force": ("speed", [5.0])}), transient=xr.Dataset())
+    run.findings = (Finding("W-PULL", "", "it pulls for 2 % of the time", severity=DOUBT, stage="transient"),)
+    stages = "dynamics", "transient"
+    assert judge_smoothness("", run, stages, SPEEDS).sentence == "in the motion in time teeth part"
+    run.findings = (*run.findings, Finding("W-PULL", "", "it pulls", severity=DOUBT, stage="dynamics"))
+    assert judge_smoothness("", run, stages, SPEEDS).sentence == "teeth part"
 
 
 @pytest.mark.parametrize(

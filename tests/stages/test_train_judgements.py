@@ -7,7 +7,9 @@ import numpy as np
 import pytest
 import xarray as xr
 
+from femgear.findings import DOUBT, Finding
 from femgear.stages.judgements import HEAT, QUIET, SMOOTH, STRONG, SURE
+from femgear.stages.strength import rate_case
 from femgear.stages.train_judgements import BY_ALL_STAGES, judge_teeth, set_judgements
 from femgear.trains.reading import read_case, with_values
 
@@ -90,6 +92,17 @@ def test_the_factors_taken_as_one_are_those_of_the_safeties_that_are_shown():
     life["flank_spectrum_safety"].values[:] = 9.0
     strong = next(set_judgements(Files(case, life=life)))
     assert strong.answer.count("over the life") == 1 and strong.limit.endswith("; K_v, K_Hβ, K_Hα taken as 1")
+
+
+def test_safeties_are_doubted_by_responses_at_speeds_of_operation_alone():
+    """A branch goes beyond them: K_v is not of it."""
+    limits = {"material.root_stress_limit": "430 MPa", "material.contact_stress_limit": "1500 MPa"}
+    run = Files(with_values(read_case(CASES / "nrel_pgb.toml"), limits))
+    for stage, words in (("branch", ""), ("response", "With a doubt s"), ("dynamics", "With a doubt s")):
+        run.findings = [Finding("W-TAIL", "", "it ends short", severity=DOUBT, stage=stage)]
+        strong = next(judge_teeth(run, rate_case(run.case)))
+        assert ("doubt: too few harmonics" in strong.limit) == bool(words)
+        assert strong.sentence.startswith(words or "Strong enough")
 
 
 def test_the_error_of_helical_meshes_is_that_of_the_slices(static):

@@ -620,7 +620,7 @@ def verdict(results: Results) -> Iterator[Block]:
     if "static" in stages:
         static = results.static
         error = _by_kind(static["mesh"].values, peak_to_peak(static, "ste") * 1e6)
-        shown = [f"{significant(value, 3)} um" for value in map(float, error)]
+        shown = [f"{significant(value, 3)} µm" for value in map(float, error)]
         text = _kinds("{}", shown, lambda text: marks(text, *LARGE, "W-POSITIONS", of=("static",)))
         rows.append((f"transmission error, peak to peak{_where(static, '')}", text))
     factors, computed, doubts = factors_of_speeds(results), known_factors(results), dict[int, tuple[str, ...]]()

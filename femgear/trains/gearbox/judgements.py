@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from itertools import groupby
-from operator import itemgetter
 from typing import Any
 
 import numpy as np
@@ -21,6 +19,7 @@ from femgear.stages.judgements import (
     NotRated,
     doubt_words,
     estimates_words,
+    figures_in_cases,
     judge_faults,
     judge_heat,
     judge_lives,
@@ -42,7 +41,7 @@ from femgear.trains.gearbox.case_file import PairSection, teeth_of
 from femgear.trains.gearbox.mode_words import near_mode
 from femgear.trains.gearbox.response_results import OF_BOX_RESPONSE, line_origin, main_way
 from femgear.trains.gearbox.silence import silence_words
-from femgear.trains.gearbox.strength import least_safety
+from femgear.trains.gearbox.strength import flank_of_shafts, least_safety
 
 _CALM = 1.01
 """Largest mesh force over its mean below which forces do not vary to speak of."""
@@ -128,22 +127,12 @@ def _listed(data: Any, name: str) -> list[str]:
     return [text for text in str(data.attrs.get(name, "")).split(" | ") if text]
 
 
-def _of_shafts(flank: str, pairs: Sequence[PairSection]) -> str:
-    """Name the gear of a pair by the shafts after which the pair is named; others as they are."""
-    for pair in pairs:
-        first, second = pair.shafts
-        if pair.name == f"{first}-{second}":
-            flank = flank.replace(f"gear 1 of {pair.name}", f"{first} in mesh with {second}")
-            flank = flank.replace(f"gear 2 of {pair.name}", f"{second} in mesh with {first}")
-    return flank
-
-
 def _least(safety: tuple[float, tuple[int, int, int]] | None, data: Any, pairs: Sequence[PairSection]) -> Least | None:
     """Name the flank of the smallest safety, and its load case where there are several."""
     if safety is None:
         return None
     value, (case, mesh, gear) = safety
-    where = _of_shafts(str(data["iso_flank"].values[mesh, gear]), pairs)
+    where = flank_of_shafts(str(data["iso_flank"].values[mesh, gear]), pairs)
     return Least(value, where if data.sizes["load_case"] == 1 else f"{where}, {data['load_case'].values[case]}")
 
 
@@ -184,9 +173,7 @@ def _motion(results: Any) -> str:
         if carries.any():
             text = f"largest mesh force {(largest[carries] / mean[carries]).max():.3f} of its mean"
             parts.append((text, results.case.load_case.name))
-    # what follows in the same load case has its name once, at the end
-    groups = [(where, [text for text, _ in group]) for where, group in groupby(parts, key=itemgetter(1))]
-    return ", ".join(f"{', '.join(texts)} ({where})" if len(cases) > 1 else ", ".join(texts) for where, texts in groups)
+    return figures_in_cases((text, where if len(cases) > 1 else "") for text, where in parts)
 
 
 def _longer(results: Any) -> str:

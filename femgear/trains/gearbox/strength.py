@@ -206,7 +206,19 @@ def describe_strength(data: Any, load_case: int, name: str) -> tuple[Block, ...]
     return (tabulate(f"Strength{name}, ISO 6336:{data.attrs['iso_edition']}", rows, columns, notes),)
 
 
-def smallest_safeties(data: Any, response: Any, marks: Marks) -> Iterator[tuple[str, str]]:
+def flank_of_shafts(flank: str, pairs: Sequence[PairSection]) -> str:
+    """Name the gear of a pair by the shafts after which the pair is named; others as they are."""
+    for pair in pairs:
+        first, second = pair.shafts
+        if pair.name == f"{first}-{second}":
+            flank = flank.replace(f"gear 1 of {pair.name}", f"{first} in mesh with {second}")
+            flank = flank.replace(f"gear 2 of {pair.name}", f"{second} in mesh with {first}")
+    return flank
+
+
+def smallest_safeties(
+    data: Any, response: Any, marks: Marks, pairs: Sequence[PairSection] = ()
+) -> Iterator[tuple[str, str]]:
     """Write rows of the smallest S_F and S_H over all load cases, with K_v of the response where there is one.
 
     Parameters
@@ -217,6 +229,8 @@ def smallest_safeties(data: Any, response: Any, marks: Marks) -> Iterator[tuple[
         dynamics.nc, whose load case is the chosen one.
     marks : Marks
         Of the findings of the run.
+    pairs : sequence of PairSection
+        Of the case, whose shafts name gears.
     """
     for name, symbol in _SAFETIES.items():
         least = least_safety(data, response, symbol)
@@ -228,7 +242,7 @@ def smallest_safeties(data: Any, response: Any, marks: Marks) -> Iterator[tuple[
         cause = f"{_STRESSES[symbol]} {1e-6 * float(data[stress].values[case, mesh, gear]):.1f} MPa"
         where = f", {cases[case]}" if len(cases) > 1 else ""
         text = marks(f"{value:.2f}", *(OF_ROOTS if symbol == "S_F" else OF_TEETH), of=("deflection",))
-        edition, flank = data.attrs["iso_edition"], data["iso_flank"].values[mesh, gear]
+        edition, flank = data.attrs["iso_edition"], flank_of_shafts(str(data["iso_flank"].values[mesh, gear]), pairs)
         yield f"smallest safety {symbol}, ISO 6336:{edition}", f"{text}, {flank}{where}: {cause}"
 
 

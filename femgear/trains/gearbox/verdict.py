@@ -39,7 +39,7 @@ def gearbox_verdict(results: Any) -> Iterator[Block]:
     if "deflection" in results.stages:
         rows += _worst_of_deflection(results.deflection, marks)
         response = results.dynamics if "dynamics" in results.stages else None
-        rows += smallest_safeties(results.deflection, response, marks)
+        rows += smallest_safeties(results.deflection, response, marks, results.case.pair)
         rows += box_reason_rows(results.stress) if "stress" in results.stages else ()
         rows += life_rows(results.deflection, marks, of=("deflection",))
         rows += planet_bearing_rows(results.deflection, marks, of=("deflection",))
@@ -70,7 +70,7 @@ def _worst_of_deflection(data: Any, marks: Marks) -> Iterator[tuple[str, str]]:
     if len(meshes):
         misaligned = data["mesh_misalignment"].values
         at = np.unravel_index(int(np.abs(misaligned).argmax()), misaligned.shape)
-        text = of_teeth(f"{1e6 * misaligned[at]:+.2f} um")
+        text = of_teeth(f"{1e6 * misaligned[at]:+.2f} µm")
         yield "largest misalignment over the width", f"{text}, {where(at, meshes)}"
         factor = data["face_load_factor"].values
         if np.isfinite(factor).any():

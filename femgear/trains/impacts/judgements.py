@@ -7,8 +7,12 @@ from typing import Any
 
 import numpy as np
 
+from femgear.case.sections import StrengthSection
 from femgear.stages.duty import ShaftEnd, duty_sentence, in_digits
-from femgear.stages.judgements import SMOOTH, Judgement, judge_numbers
+from femgear.stages.judgements import SMOOTH, Judgement, NotRated, judge_noise, judge_numbers, judge_strength
+
+_WITH_TEETH = "femgear new pair writes a case with tooth shapes"
+"""What gives a pair with play what its kind of case has not."""
 
 
 def impact_duty(case: Any) -> str:
@@ -20,6 +24,8 @@ def impact_duty(case: Any) -> str:
 
 def impact_judgements(results: Any) -> Iterator[Judgement]:
     """Judge a gear pair with play."""
+    without = NotRated("the case gives no tooth shapes", f"{_WITH_TEETH}: give it treatment and hardness")
+    yield judge_strength(None, None, StrengthSection(), without=without)
     if "response" in results.stages:
         data = results.response
         largest = float(data["amplitude"].max())
@@ -38,4 +44,9 @@ def impact_judgements(results: Any) -> Iterator[Judgement]:
             yield Judgement(SMOOTH, "look", answer, where, f"{where}{', and strike the back flanks' if both else ''}")
         else:
             yield Judgement(SMOOTH, "good", answer, "teeth stay in contact at all speeds", "Teeth stay in contact")
+    no_level, remedy = (
+        "no level: this kind of case has no housing",
+        f"{_WITH_TEETH}, which femgear casing puts in a casing",
+    )
+    yield judge_noise(no_level, "", open_words=remedy, computed=False)
     yield judge_numbers(results.findings, results.manifest.complete)

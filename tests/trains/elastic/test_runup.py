@@ -526,7 +526,7 @@ def test_the_verdict_shows_errors_of_tiny_loads(case, files):
         static[name] = static[name] * 1e-5
     told, _ = told_of(case, {"static": static, "stress": files["stress"]})
     said = next(text for name, text in told.items() if name.startswith("transmission error"))
-    assert "0.000 um" not in said and "e-06 um" in said
+    assert "0.000 µm" not in said and "e-06 µm" in said
 
 
 def test_the_curve_at_the_right_is_what_the_microphone_hears_at_the_operating_speeds(case, files):

@@ -202,14 +202,3 @@ def test_each_number_of_the_motion_names_its_load_case_and_neighbours_of_one_cas
     assert judgements._motion(two).startswith("transmission error 2 µm, face load factor K_Hβ 1.4, dynamic factor")
     two.stages = ()
     assert judgements._motion(two) == ""
-
-
-def test_gears_of_pairs_named_after_their_shafts_have_the_names_of_these():
-    pairs = [
-        SimpleNamespace(name=f"short planet {i}-long planet {i}", shafts=(f"short planet {i}", f"long planet {i}"))
-        for i in (1, 11)
-    ]
-    pairs.append(SimpleNamespace(name="first stage", shafts=("motor", "pinion")))
-    named = judgements._of_shafts("gear 2 of short planet 11-long planet 11", pairs)
-    assert named == "long planet 11 in mesh with short planet 11"
-    assert judgements._of_shafts("gear 1 of first stage", pairs) == "gear 1 of first stage"

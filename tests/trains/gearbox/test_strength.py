@@ -15,6 +15,7 @@ from femgear.trains.gearbox.case_file import teeth_of
 from femgear.trains.gearbox.deflection import solve_deflection
 from femgear.trains.gearbox.strength import (
     describe_strength,
+    flank_of_shafts,
     rated_stage,
     rated_stages,
     smallest_safeties,
@@ -174,3 +175,14 @@ def test_the_verdict_has_the_dynamic_factor_of_the_response(data):
     assert running["smallest safety S_F, ISO 6336:2019"].startswith(f"{expected:.2f}, ")
     other = dict(smallest_safeties(data.assign_attrs(load_case=0), response, Marks(())))
     assert other["smallest safety S_F, ISO 6336:2019"] != running["smallest safety S_F, ISO 6336:2019"]
+
+
+def test_gears_of_pairs_named_after_their_shafts_have_the_names_of_these():
+    pairs = [
+        SimpleNamespace(name=f"short planet {i}-long planet {i}", shafts=(f"short planet {i}", f"long planet {i}"))
+        for i in (1, 11)
+    ]
+    pairs.append(SimpleNamespace(name="first stage", shafts=("motor", "pinion")))
+    named = flank_of_shafts("gear 2 of short planet 11-long planet 11", pairs)
+    assert named == "long planet 11 in mesh with short planet 11"
+    assert flank_of_shafts("gear 1 of first stage", pairs) == "gear 1 of first stage"

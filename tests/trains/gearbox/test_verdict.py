@@ -17,7 +17,7 @@ pytestmark = pytest.mark.usefixtures("coarse_states")
 def results():
     answer = answer_in_a_casing()
     data = {name: answer[name].contents() for name in answer}
-    return SimpleNamespace(stages=tuple(data), findings=(), **data)
+    return SimpleNamespace(stages=tuple(data), findings=(), case=answer.case, **data)
 
 
 def test_levels_come_with_line_way_and_mode(results):

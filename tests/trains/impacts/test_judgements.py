@@ -6,7 +6,7 @@ from types import SimpleNamespace
 import pytest
 import xarray as xr
 
-from femgear.stages.judgements import SMOOTH, SURE
+from femgear.stages.judgements import QUIET, SMOOTH, STRONG, SURE
 from femgear.trains.impacts.judgements import impact_duty, impact_judgements
 from femgear.trains.reading import read_case
 
@@ -34,9 +34,12 @@ def test_teeth_part_where_they_are_free(free, back, state, words):
     case = read_case(CASES / "gear_pair.toml")
     manifest = SimpleNamespace(complete=True)
     results = SimpleNamespace(case=case, stages=("response",), findings=(), response=response, manifest=manifest)
-    smooth, sure = impact_judgements(results)
+    strong, smooth, quiet, sure = impact_judgements(results)
     assert (smooth.question, smooth.state, sure.question) == (SMOOTH, state, SURE)
     assert smooth.sentence.startswith(words) and "115 µm, 3.84 half backlashes" in smooth.answer
+    assert (strong.question, strong.state, strong.answer) == (STRONG, "absent", "not rated")
+    assert strong.sentence == "Its strength is not rated: the case gives no tooth shapes"
+    assert (quiet.question, quiet.state) == (QUIET, "absent")
 
 
 def test_a_pair_with_play_says_its_torques_and_backlash():
