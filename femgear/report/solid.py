@@ -194,7 +194,7 @@ def _modes(modes: xr.Dataset) -> list[dict[str, Any]]:
             body: [factor * float(shape.get(f"{body}: {axis}", 0.0)) for axis, factor in _AXES.items()]
             for body in bodies
         }
-        title = f"{mode + 1}: {frequency[mode]:.5g} Hz, {modes['kind'].values[mode]}"
+        title = f"{mode + 1}: {frequency[mode]:,.5g} Hz, {modes['kind'].values[mode]}"
         shapes.append({"title": title, "bodies": moved, "ring": _waves(modes, mode)})
     return shapes
 

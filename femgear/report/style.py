@@ -378,7 +378,7 @@ def digits(value: float) -> str:
 
 def rpm(speed: float) -> str:
     """Write an input speed [rpm], as datasets have it, in a title."""
-    return f"{float(speed):.6g} rpm"
+    return f"{float(speed):,.6g} rpm"
 
 
 def xy(points):

@@ -192,14 +192,17 @@ def level_change_at(data: xr.Dataset, speed) -> np.ndarray:
     return np.interp(speed, data["speed"].values[finite], change[finite])
 
 
-def shown_level(value: float, change: float, marks: Marks, *codes: str, of: tuple[str, ...] = ()) -> str:
+def shown_level(
+    value: float, change: float, marks: Marks, *codes: str, of: tuple[str, ...] = (), digits: int = 4
+) -> str:
     """Write a level, a bound where a longer excitation raises it by much, marked where it is doubtful.
 
     ``codes`` are those of further findings that concern it, ``of`` the stages whose findings do.
     """
     if change >= NOTICEABLE:
         return marks(lower_bound(value), *(code for code in codes if code != "W-EXCITATION"), of=of)
-    return marks(f"{value:.4g}", *doubtful_excitation(change), *codes, of=of)
+    text = f"{value:,.0f}" if value >= 10.0**digits else f"{value:.{digits}g}"  # no exponents
+    return marks(text, *doubtful_excitation(change), *codes, of=of)
 
 
 def doubtful_excitation(change: float) -> tuple[str, ...]:

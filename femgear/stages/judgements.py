@@ -221,7 +221,7 @@ def doubt_words(doubts: Sequence[str]) -> str:
 
 def stresses_text(root: np.ndarray, pressure: np.ndarray) -> str:
     """Write the largest of root stresses (...) and contact pressures (...) [Pa]."""
-    return f"root {1e-6 * float(np.nanmax(root)):.0f} MPa, pressure {1e-6 * float(np.nanmax(pressure)):.0f} MPa"
+    return f"root {1e-6 * float(np.nanmax(root)):,.0f} MPa, pressure {1e-6 * float(np.nanmax(pressure)):,.0f} MPa"
 
 
 def judge_strength(
@@ -602,6 +602,7 @@ VOICES = (("a relaxed", 54.0), ("a normal", 60.0), ("a raised", 66.0), ("a loud"
 _STEP_OF_VOICES = 6.0
 """From one voice to the next [dB]."""
 CLEAR = "no resonance makes the level at a speed of operation"
+"""Of a level whose resonances were looked at."""
 MAKES_LEVEL = 0.5
 """Share of the level from which on one resonance makes it."""
 NEAR_RESONANCE = 10.0
@@ -641,7 +642,7 @@ class LevelMargin:
     def words(self) -> str:
         """The margin in words."""
         side = "over" if self.decibels > 0.0 else "below"
-        return f"{abs(self.decibels):.1f} dB {side} the limit at {self.place}, {self.speed:,.4g} rpm"
+        return f"{abs(self.decibels):.1f} dB {side} the limit of the case at {self.place}, {self.speed:,.4g} rpm"
 
 
 def margins_of_levels(
@@ -689,7 +690,7 @@ def judge_noise(
     answer: str,
     sentence: str,
     resonance: str = "",
-    open_words: str = CLEAR,
+    open_words: str = "",
     margins: Sequence[LevelMargin] = (),
     doubts: str = "",
     rests_on: str = "",
@@ -707,7 +708,7 @@ def judge_noise(
     resonance : str
         The resonance that makes the level at a speed of operation, empty where there is none.
     open_words : str
-        What to say where there is neither a limit nor a resonance.
+        What to say where there is no limit: which entry gives one.
     margins : sequence of LevelMargin
         Of the levels that have a limit.
     doubts : str
@@ -729,9 +730,13 @@ def judge_noise(
             return Judgement(QUIET, "bad", answer, doubted(worst.words), f"{sentence}. Too loud: {worst.words}")
         state: State = "look" if resonance or doubts else "good"
         return Judgement(QUIET, state, answer, doubted(resonance, worst.words), sentence)
-    return Judgement(
-        QUIET, "look" if resonance or doubts else "open", answer, doubted(resonance or open_words), sentence
-    )
+    return Judgement(QUIET, "look" if resonance or doubts else "open", answer, doubted(resonance, open_words), sentence)
+
+
+def no_limit_words(entries: str, resonances_known: bool, resonance: str) -> str:
+    """Say that a level has no limit, which entries give one, and that no resonance makes it where that is known."""
+    clear = f"{CLEAR}; " if resonances_known and not resonance else ""
+    return f"{clear}no limit: give {entries}"
 
 
 def _doubts_by_code(doubts: Sequence[Finding]) -> str:

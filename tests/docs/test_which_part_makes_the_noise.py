@@ -20,6 +20,7 @@ pytestmark = pytest.mark.slow
 class Stored(dict):
     """Contents of files by stage, as results have them."""
 
+    case = read_case(ROOT / "cases" / "e_axle_in_a_casing.toml")
     findings = ()
     stages = property(lambda self: tuple(self))
     __getattr__ = dict.__getitem__

@@ -248,7 +248,7 @@ def test_page_one_answers_the_questions_of_a_set(tmp_path):
 
     unrated = with_values(read_case(CASE), NO_STEELS)
     text = html(ELASTIC, open_results(make_run(tmp_path / "out", case=unrated, change=change)))
-    front = text[text.index('<section class="front"') : text.index("</section>")]
+    front = text[text.index('<section class="front') : text.index("</section>")]
     states = re.findall(r'<li class="card (\w+)"><p class="question">([^<?]*\?) <b>(.) ([^<]*)</b>', front)
     questions = {question: state for state, question, _, _ in states}
     assert questions["Is it strong enough?"] == "absent" and questions["Can the numbers be relied on?"] == "look"

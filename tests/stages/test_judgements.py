@@ -409,14 +409,14 @@ def test_a_level_is_judged_by_the_worst_of_its_limits():
     every = ([-9.0, -3.0, -5.0], [-2.0, 1.5, 0])
     (below,), (over,) = (tuple(margins_of_levels(speed, np.array(values), "foot")) for values in every)
     holds = judge_noise("1 m/s²", "so", margins=(below,))
-    assert (holds.state, holds.limit) == ("good", "3.0 dB below the limit at foot, 2,000 rpm")
+    assert (holds.state, holds.limit) == ("good", "3.0 dB below the limit of the case at foot, 2,000 rpm")
     met = judge_noise("1 m/s²", "so", "mode 3 meets mesh harmonic 2", margins=(below,))
     assert (met.state, met.limit) == ("look", f"mode 3 meets mesh harmonic 2; {holds.limit}")
     doubtful = judge_noise("1 m/s²†", "so", margins=(below,), doubts="† it ends short")
     assert (doubtful.state, doubtful.limit) == ("look", f"{holds.limit}; † it ends short")
     fails = judge_noise("1 m/s²", "so", "mode 3 meets mesh harmonic 2", margins=(below, over))
-    assert (fails.state, fails.limit) == ("bad", "1.5 dB over the limit at foot, 2,000 rpm")
-    assert fails.sentence == "so. Too loud: 1.5 dB over the limit at foot, 2,000 rpm"
+    assert (fails.state, fails.limit) == ("bad", "1.5 dB over the limit of the case at foot, 2,000 rpm")
+    assert fails.sentence == "so. Too loud: 1.5 dB over the limit of the case at foot, 2,000 rpm"
 
 
 def test_numbers_are_judged_by_the_findings():

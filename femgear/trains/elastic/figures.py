@@ -543,7 +543,7 @@ def _runup_figures(drawn: Drawn) -> Drawings:
         weighted = "microphone\n[dB(A) re 20 µPa]", pressure_level(pressure, frequency)
     else:
         lines = runup["lines_real"].values + 1j * runup["lines_imag"].values
-        weighted = "A-weighted level\n[dB(A) re 1 µm/s²]", acceleration_level(lines, frequency)
+        weighted = "sensor, A-weighted\n[dB(A) re 1 µm/s²]", acceleration_level(lines, frequency)
     return runup_figures(runup, drawn.data["modes"], _level_limit(drawn), weighted)
 
 

@@ -12,7 +12,6 @@ from femgear.findings import CATALOGUE, percent
 from femgear.report.tables import Marks, is_bound, level_change_at
 from femgear.stages.assumptions import most_decisive
 from femgear.stages.judgements import (
-    CLEAR,
     MAKES_LEVEL,
     NEAR_RESONANCE,
     Judgement,
@@ -22,6 +21,7 @@ from femgear.stages.judgements import (
     judge_noise,
     judge_numbers,
     margins_of_levels,
+    no_limit_words,
     resonance_of_line,
     voice_words,
 )
@@ -29,7 +29,6 @@ from femgear.stages.train_judgements import judge_teeth
 from femgear.trains.elastic.results import known_factors, level_changes, level_doubts, marked_level, rate_set
 from femgear.trains.elastic.runup import loudest
 
-_OPEN = f"{CLEAR}; housing.level_limit or housing.microphone.level_limit gives a limit"
 _STANDS_OUT = 0.1
 """Share of the power of all lines from which on the largest one stands out of them."""
 
@@ -51,13 +50,15 @@ def _noise(results: Any) -> Judgement:
     level, speeds = housing["level"].values, housing["speed"].values
     at = int(level.argmax())
     speed = float(speeds[at])
-    at_microphone, compared = "", ""
+    at_microphone, compared, limits = "", "", "housing.level_limit"
     if "pressure_level" in housing:
         sound = float(housing["pressure_level"][at])
         at_microphone = f" ({sound:.1f} dB(A) at the microphone)"
         compared = f", {voice_words(sound)}"
+        limits += " or housing.microphone.level_limit"
     marks = Marks(results.findings)
-    size_words = f"{marked_level(results, at, marks, level_doubts(results, [at]).get(at, ()))} m/s²{at_microphone}"
+    level_words = marked_level(results, at, marks, level_doubts(results, [at]).get(at, ()), digits=3)
+    size_words = f"{level_words} m/s² r.m.s.{at_microphone}"
     answer = f"{size_words} at {speed:,.4g} rpm"
     carrier = abs(float(housing["carrier_speed"].values[at]))
     orders = housing["order"].values
@@ -70,7 +71,7 @@ def _noise(results: Any) -> Judgement:
     line_words = f"{origin} at {hertz:,.0f} Hz"
     resonance, cause = "", ""
     if "runup" in results.stages:
-        resonance, cause = _resonance(results, speed)
+        resonance, cause = _resonance(results, speed, carrier * results.case.ring.teeth / (2.0 * np.pi))
     elif "modes" in results.stages:
         resonance = resonance_of_line(line_words, hertz, results.modes["frequency"].values, share)
     if not cause:
@@ -82,12 +83,14 @@ def _noise(results: Any) -> Judgement:
         sentence += f", with half and twice of what is assumed: {decisive}"
     margins, levels = tuple(_margins(results)), [size_words]
     if "runup" in results.stages:
-        levels.append(loudest(results.runup, marks))
+        levels.append(loudest(results.runup, marks, digits=3))
         sentence += f". Largest of the run-up: {_bound_in_words(levels[-1])}"
     # a bound has no mark: it is one itself
     doubts = [*([CATALOGUE["W-EXCITATION"].words] if any(map(is_bound, levels)) else []), *marks.words]
     rests_on = estimates_words(results.findings)
-    return judge_noise(answer, sentence, resonance, _OPEN, margins, doubt_words(doubts), rests_on)
+    known = "runup" in results.stages or "modes" in results.stages
+    open_words = no_limit_words(limits, known, resonance)
+    return judge_noise(answer, sentence, resonance, open_words, margins, doubt_words(doubts), rests_on)
 
 
 def _bound_in_words(level: str) -> str:
@@ -129,11 +132,12 @@ def _nearest_mode(results: Any, hertz: float) -> str:
     return f"near mode {mode + 1}: {results.modes['kind'].values[mode]}"
 
 
-def _resonance(results: Any, loudest_speed: float) -> tuple[str, str]:
+def _resonance(results: Any, loudest_speed: float, mesh_frequency: float) -> tuple[str, str]:
     """Write the resonance that makes most of a level of operation, and the same as the cause in the sentence.
 
     It is of all lines of a mesh harmonic: its share may be more than that of the largest line, of another harmonic.
-    That of the loudest speed of operation [rpm] goes before all others, and is alone the cause there.
+    That of the loudest speed of operation [rpm], with its mesh frequency [Hz], goes before all others, and is alone
+    the cause there.
 
     Returns
     -------
@@ -153,12 +157,12 @@ def _resonance(results: Any, loudest_speed: float) -> tuple[str, str]:
     at_loudest = np.where(np.isclose(speeds, loudest_speed), makes, 0.0)
     at = int((at_loudest if at_loudest.any() else makes).argmax())
     mode, harmonic = int(runup["mode"].values[at]), int(runup["mesh_harmonic"].values[at])
-    speed, side = float(speeds[at]), "below" if distance[at] < 0.0 else "above"
-    share, apart = float(makes[at]) ** 2, f"{abs(distance[at]):.1f} % {side} {speed:,.4g} rpm"
-    power = f"{percent(share)} of the power" if share < 1.0 else "as much as all lines together"
-    lines = f"all their lines make {power}"
-    card = f"mode {mode} meets mesh harmonic {harmonic}, {apart}: {lines}"
+    speed, share = float(speeds[at]), float(makes[at]) ** 2
+    power = f"makes {percent(share)} of the power" if share < 1.0 else "alone is as loud as all lines together"
+    met = f"mesh harmonic {harmonic} meets mode {mode} at {speed * (1.0 + 0.01 * distance[at]):,.4g} rpm"
+    card = f"{met}, which {power} at {speed:,.4g} rpm"
     if not at_loudest.any():
         return card, ""
     kind = f" ({results.modes['kind'].values[mode - 1]})" if "modes" in results.stages else ""
-    return card, f"mesh harmonic {harmonic} excites mode {mode}{kind}, which makes {power}"
+    hertz = f"{harmonic * mesh_frequency:,.0f} Hz"
+    return card, f"mesh harmonic {harmonic} at {hertz} excites mode {mode}{kind}, which {power}"

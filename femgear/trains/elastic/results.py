@@ -674,10 +674,11 @@ def level_doubts(results: Results, more: Iterable[int] = ()) -> dict[int, tuple[
     }
 
 
-def marked_level(results: Results, i: int, marks: Marks, codes: Iterable[str]) -> str:
+def marked_level(results: Results, i: int, marks: Marks, codes: Iterable[str], *, digits: int = 4) -> str:
     """Write the level of the housing at a speed by its number, with marks of what makes it doubtful [m/s^2]."""
     change = float(level_changes(results)[i])
-    return shown_level(float(results.housing["level"][i]), change, marks, *codes, "W-POINTS", of=_OF_LEVEL)
+    level = float(results.housing["level"][i])
+    return shown_level(level, change, marks, *codes, "W-POINTS", of=_OF_LEVEL, digits=digits)
 
 
 def _all_of(doubts: Mapping[int, tuple[str, ...]]) -> tuple[str, ...]:

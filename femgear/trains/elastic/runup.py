@@ -292,8 +292,8 @@ def meeting_columns(value: Mapping[str, np.ndarray]) -> dict[str, Callable[[int]
     }
 
 
-def loudest(data: xr.Dataset, marks: Marks) -> str:
-    """Write the largest level of runup.nc, its speed, and whether the level may rise beyond that.
+def loudest(data: xr.Dataset, marks: Marks, *, digits: int = 4) -> str:
+    """Write the largest level of runup.nc in so many digits, its speed, and whether the level may rise beyond that.
 
     More excitation may also lift another speed above it.
     """
@@ -304,7 +304,7 @@ def loudest(data: xr.Dataset, marks: Marks) -> str:
     with np.errstate(divide="ignore"):
         raised = 20.0 * np.log10(level / level[worst]) + changes
     change = float(changes[worst] if np.isnan(raised).any() else max(raised.max(), changes[worst]))
-    text = shown_level(level[worst], change, marks, "W-STEPS", *_RUN_UP_DOUBTS, of=("runup",))
+    text = shown_level(level[worst], change, marks, "W-STEPS", *_RUN_UP_DOUBTS, of=("runup",), digits=digits)
     return f"{text} m/s² at {speed[worst]:,.4g} rpm{end}"
 
 
@@ -316,7 +316,7 @@ def largest_factors(data: xr.Dataset, marks: Marks) -> str:
         worst = int(factor.argmax())
         codes = *doubtful_excitation(float(change[worst])), "W-STEPS", *_RUN_UP_DOUBTS
         text = marks(f"{factor[worst]:.3f}", *codes, of=("runup",))
-        texts.append(f"{kind} {text} at {speed[worst]:.6g} rpm")
+        texts.append(f"{kind} {text} at {speed[worst]:,.4g} rpm")
     return ", ".join(texts)
 
 

@@ -13,6 +13,7 @@ from femgear.findings import percent
 from femgear.report.tables import Marks, merged_names
 from femgear.stages.duty import in_digits
 from femgear.stages.judgements import (
+    NEAR_RESONANCE,
     Judgement,
     Least,
     LevelMargin,
@@ -31,6 +32,7 @@ from femgear.stages.judgements import (
     lives_of_bearings,
     lives_of_teeth,
     margins_of_levels,
+    no_limit_words,
     resonance_of_line,
     stresses_text,
 )
@@ -219,14 +221,14 @@ def _noise(results: Any) -> Judgement:
     sensor = int(level.argmax())
     whole, name, speed = float(level[sensor]), data["sensor"].values[sensor], float(data["speed"].values[0])
     marks = Marks(results.findings)
-    size_words = _marked(whole, marks, "dynamics")
-    answer = f"{size_words} at {name}, {speed:,.4g} rpm"
+    size_words = _marked(whole, marks, "dynamics") + " r.m.s." * (whole > 0.0)
+    answer = f"{size_words} at {name}, {speed:,.4g} rpm{_load_case(results)}"
     if not whole > 0.0:
         return judge_noise(answer, "", open_words="nothing excites it")
     size = np.hypot(data["lines_real"].values[0, sensor], data["lines_imag"].values[0, sensor])
     line = int(size.argmax())
     hertz = float(data["order"].values[line]) * speed / 60.0
-    mode = "" if modes is None else near_mode(modes, hertz)
+    mode = "" if modes is None else near_mode(modes, hertz, 0.01 * NEAR_RESONANCE)
     near = f", near {mode}," if mode else ""
     share, line_words = 0.5 * (size[line] / whole) ** 2, f"{line_origin(data, line)} at {hertz:,.0f} Hz"
     sentence = (
@@ -237,7 +239,7 @@ def _noise(results: Any) -> Judgement:
         sentence += f"; the largest part comes by {main_way(data, sensor)}"
     if "runup" in results.stages and "level" in results.runup:
         sentence += f". Largest of the run-up: {_loudest_of_run_up(results.runup, marks, name)}"
-    open_words = "sensor.level_limit gives a limit"
+    open_words = no_limit_words("sensor.level_limit", modes is not None, resonance)
     margins = tuple(_margins(results))
     rests_on = estimates_words(results.findings)
     return judge_noise(answer, sentence, resonance, open_words, margins, doubt_words(marks.words), rests_on)

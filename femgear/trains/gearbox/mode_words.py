@@ -45,10 +45,10 @@ def mesh_lines_and_modes(data: Any) -> tuple[np.ndarray, list[tuple[str, float]]
     return np.abs(np.log(np.array([line for _, line in lines])[:, None] / modes)), lines, modes
 
 
-def near_mode(data: Any, frequency: float) -> str:
+def near_mode(data: Any, frequency: float, within: float = NEAR) -> str:
     """Write the mode of modes.nc that a frequency [Hz] is near, see `nearest_mode`; empty where none is."""
     hertz = data["frequency"].values
-    near = (hertz > 0.0) & (np.abs(hertz - frequency) <= NEAR * frequency)
+    near = (hertz > 0.0) & (np.abs(hertz - frequency) <= within * frequency)
     return nearest_mode(data, frequency) if near.any() else ""
 
 
@@ -60,4 +60,4 @@ def nearest_mode(data: Any, frequency: float) -> str:
         return "no mode"
     number = int(elastic[np.abs(np.log(hertz[elastic] / frequency)).argmin()])
     kind, member = data["kind"].values[number], data["main_member"].values[number]
-    return f"mode {number + 1} at {hertz[number]:.0f} Hz ({kind if kind == member else f'{kind}, {member}'})"
+    return f"mode {number + 1} at {hertz[number]:,.0f} Hz ({kind if kind == member else f'{kind}, {member}'})"

@@ -107,7 +107,7 @@ def _nearest_mode(data: Any) -> Iterator[tuple[str, str]]:
     name, line, mode = nearest_mesh_line(data)
     if name:
         apart = f"{100.0 * abs(line / mode - 1.0):.3g} % {'below' if line < mode else 'above'}"
-        text = f"{name}, {line:.0f} Hz, {apart} {nearest_mode(data, mode)}"
+        text = f"{name}, {line:,.0f} Hz, {apart} {nearest_mode(data, mode)}"
         yield f"mesh line up to harmonic {MESH_LINES} nearest to a mode", text
 
 
@@ -136,7 +136,7 @@ def _heard(data: Any, modes: Any, marks: Marks) -> Iterator[tuple[str, str]]:
     for sensor in _judged(data) if "level" in data else ():
         name, whole = data["sensor"].values[sensor], float(data["level"].values[0, sensor])
         text = marks(level_text(whole), *_level_codes(data, 0, sensor), of=("dynamics",))
-        yield f"level at {name}", f"{text} at {speed:.5g} rpm"
+        yield f"level at {name}", f"{text} at {speed:,.5g} rpm"
         if whole > 0.0 and "lines_real" in data:
             yield f"main line at {name}", _main_line(data, sensor, whole, modes)
         if whole > 0.0 and "path_share" in data:
@@ -149,7 +149,7 @@ def _main_line(data: Any, sensor: int, whole: float, modes: Any) -> str:
     size = np.hypot(data["lines_real"].values[0, sensor], data["lines_imag"].values[0, sensor])
     line = int(size.argmax())
     hertz = float(data["order"].values[line]) * float(data["speed"].values[0]) / 60.0
-    text = f"{hertz:.1f} Hz, {line_origin(data, line)}: {percent(0.5 * (size[line] / whole) ** 2)} of the power"
+    text = f"{hertz:,.1f} Hz, {line_origin(data, line)}: {percent(0.5 * (size[line] / whole) ** 2)} of the power"
     mode = "" if modes is None else near_mode(modes, hertz)
     return f"{text}; {mode}" if mode else text
 
@@ -160,7 +160,7 @@ def _forces(data: Any, name: str, marks: Marks, stage: str) -> Iterator[tuple[st
         return
     speed, number, _ = np.unravel_index(int(np.nanargmax(factor)), factor.shape)
     text = marks(f"{np.nanmax(factor):.3f}", "W-EXCITATION", *OF_BOX_RESPONSE, of=(stage,))
-    yield name, f"{text}, {data['stage'].values[number]} at {float(data['speed'].values[speed]):.5g} rpm"
+    yield name, f"{text}, {data['stage'].values[number]} at {float(data['speed'].values[speed]):,.5g} rpm"
 
 
 def _over_speeds(data: Any, marks: Marks) -> Iterator[tuple[str, str]]:
@@ -171,5 +171,5 @@ def _over_speeds(data: Any, marks: Marks) -> Iterator[tuple[str, str]]:
         parts = data["level_of_stage"].values[at, sensor]
         text = marks(level_text(float(level[at])), *_level_codes(data, at, sensor), of=("runup",))
         speed, stage = float(data["speed"].values[at]), data["stage"].values[int(parts.argmax())]
-        yield f"loudest of the run-up at {data['sensor'].values[sensor]}", f"{text} at {speed:.5g} rpm, by {stage}"
+        yield f"loudest of the run-up at {data['sensor'].values[sensor]}", f"{text} at {speed:,.5g} rpm, by {stage}"
     yield from _forces(data, "largest mesh force over its mean, run-up", marks, "runup")

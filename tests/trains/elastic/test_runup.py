@@ -539,4 +539,4 @@ def test_the_curve_at_the_right_is_what_the_microphone_hears_at_the_operating_sp
     assert inside.any() and np.interp(rpm[inside], speed, heard) == pytest.approx(expected, abs=0.3)
     alone = ELASTIC.figures["runup"].draw(Drawn(case, {name: files[name] for name in ("runup", "modes")}))
     words = [ax.get_ylabel() for ax in alone["run_up_levels"].axes]
-    assert "A-weighted level\n[dB(A) re 1 µm/s²]" in words
+    assert "sensor, A-weighted\n[dB(A) re 1 µm/s²]" in words

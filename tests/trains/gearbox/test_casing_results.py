@@ -58,7 +58,7 @@ def test_the_verdict_names_the_foot_that_carries_most(data):
     size = np.linalg.norm(data["foot_force"].values[0], axis=1)
     assert float(value.split()[0]) == pytest.approx(size.max(), rel=1e-3)
     assert value.endswith(f"foot {list(FEET)[int(size.argmax())]}")
-    results = SimpleNamespace(stages=("deflection",), deflection=data, findings=())
+    results = SimpleNamespace(case=SimpleNamespace(pair=()), stages=("deflection",), deflection=data, findings=())
     assert text in [row[0] for block in gearbox_verdict(results) for row in block.rows]
 
 

@@ -103,22 +103,24 @@ def test_the_worst_sensor_is_judged_by_its_limit(results):
     for factor, state in ((2.0, "good"), (0.5, "bad")):
         noise = with_limit(results, factor)
         assert noise.state == state
-        assert f"6.0 dB {'below' if state == 'good' else 'over'} the limit at top, " in noise.limit
+        assert f"6.0 dB {'below' if state == 'good' else 'over'} the limit of the case at top, " in noise.limit
 
 
 def test_a_level_below_its_limit_deserves_a_look_where_its_excitation_ends_short(results):
     short = Finding("W-EXCITATION", "dynamics.up_to", "it ends short", severity=DOUBT, stage="dynamics")
     noise = with_limit(results, 2.0, -2.0, (short,))
-    assert noise.state == "look" and "6.0 dB below the limit at top" in noise.limit
+    assert noise.state == "look" and "6.0 dB below the limit of the case at top" in noise.limit
     assert noise.limit.endswith("; doubt: † excitation falls short")
     # the level of the other stage has no mark
-    assert " m/s²† at top" in noise.answer and noise.sentence.count("†") == 1
+    assert " m/s²† r.m.s. at top" in noise.answer and noise.sentence.count("†") == 1
     assert with_limit(results, 2.0, 0.0, (replace(short, stage="deflection"),)).state == "good"
 
 
 def test_a_level_that_a_longer_excitation_takes_over_its_limit_does_not_hold(results):
     noise = with_limit(results, 2.0, 7.0)
-    assert noise.state == "bad" and noise.limit.startswith("1.0 dB over the limit at top with a longer excitation, ")
+    assert noise.state == "bad" and noise.limit.startswith(
+        "1.0 dB over the limit of the case at top with a longer excitation, "
+    )
 
 
 def test_the_loudest_sensor_of_the_run_up_is_named_where_it_is_another_one(results):

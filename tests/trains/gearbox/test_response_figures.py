@@ -167,7 +167,7 @@ def test_stems_reach_the_amplitudes_of_their_stage_at_the_loudest_speed():
     size = np.hypot(data["lines_real"].values, data["lines_imag"].values)[3]
     hertz = data["order"].values * data["speed"].values[3] / 60.0
     for sensor, ax in enumerate(figure.axes):
-        assert ax.get_title(loc="left") == f"sensor s{sensor}, 2500 rpm"
+        assert ax.get_title(loc="left") == f"sensor s{sensor}, 2,500 rpm"
         drawn = {line.get_label(): line for line in ax.lines if not line.get_label().startswith("_")}
         for stage in STAGES:
             own = np.flatnonzero(data["origin"].values == stage)

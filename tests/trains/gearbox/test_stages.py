@@ -95,7 +95,9 @@ def test_the_verdict_names_the_worst_of_all_load_cases(results):
     assert rows["largest misalignment over the width"].endswith(f"stage, {worst}")
     assert f"{np.nanmax(results.deflection['face_load_factor'].values):.3f}" in rows["largest face load factor K_Hβ"]
     nearest = rows["mesh line up to harmonic 3 nearest to a mode"]
-    assert re.fullmatch(r"(harmonic [23] of )?stage mesh, \d+ Hz, \S+ % (above|below) mode \d+ at \d+ Hz .*", nearest)
+    assert re.fullmatch(
+        r"(harmonic [23] of )?stage mesh, [\d,]+ Hz, \S+ % (above|below) mode \d+ at [\d,]+ Hz .*", nearest
+    )
 
 
 @pytest.mark.slow

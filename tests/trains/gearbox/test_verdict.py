@@ -28,12 +28,12 @@ def test_levels_come_with_line_way_and_mode(results):
     hertz = data["order"].values[at] * data["speed"].values[0] / 60.0
     assert rows["level at top"].startswith(level_text(float(data["level"].values[0, 0])))
     main = rows["main line at top"]
-    assert main.startswith(f"{hertz:.1f} Hz, stage, mesh harmonic {data['harmonic'].values[at]:g}")
+    assert main.startswith(f"{hertz:,.1f} Hz, stage, mesh harmonic {data['harmonic'].values[at]:g}")
     assert main.endswith(nearest_mode(results.modes, hertz))
     way = data["path"].values[int(data["path_share"].values[0, :, 0].argmax())]
     assert rows["most of it at top comes by"].startswith(str(way))
     loudest = results.runup["speed"].values[int(results.runup["level"].values[:, 0].argmax())]
-    assert f"at {loudest:.5g} rpm, by stage" in rows["loudest of the run-up at top"]
+    assert f"at {loudest:,.5g} rpm, by stage" in rows["loudest of the run-up at top"]
 
 
 def test_doubtful_numbers_are_marked(results):
