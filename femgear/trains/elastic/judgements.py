@@ -88,8 +88,8 @@ def _noise(results: Any) -> Judgement:
     # a bound has no mark: it is one itself
     doubts = [*([CATALOGUE["W-EXCITATION"].words] if any(map(is_bound, levels)) else []), *marks.words]
     rests_on = estimates_words(results.findings)
-    known = "runup" in results.stages or "modes" in results.stages
-    open_words = no_limit_words(limits, known, resonance)
+    resonances_known = "runup" in results.stages or "modes" in results.stages
+    open_words = no_limit_words(limits, resonances_known, resonance)
     return judge_noise(answer, sentence, resonance, open_words, margins, doubt_words(doubts), rests_on)
 
 
@@ -159,8 +159,8 @@ def _resonance(results: Any, loudest_speed: float, mesh_frequency: float) -> tup
     mode, harmonic = int(runup["mode"].values[at]), int(runup["mesh_harmonic"].values[at])
     speed, share = float(speeds[at]), float(makes[at]) ** 2
     power = f"makes {percent(share)} of the power" if share < 1.0 else "alone is as loud as all lines together"
-    met = f"mesh harmonic {harmonic} meets mode {mode} at {speed * (1.0 + 0.01 * distance[at]):,.4g} rpm"
-    card = f"{met}, which {power} at {speed:,.4g} rpm"
+    meeting = f"mesh harmonic {harmonic} meets mode {mode} at {speed * (1.0 + 0.01 * distance[at]):,.4g} rpm"
+    card = f"{meeting}, which {power} at {speed:,.4g} rpm"
     if not at_loudest.any():
         return card, ""
     kind = f" ({results.modes['kind'].values[mode - 1]})" if "modes" in results.stages else ""
