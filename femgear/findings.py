@@ -407,6 +407,12 @@ CATALOGUE = {
         "REXS file with other content",
         "Compare the entries that the message names with their source.",
     ),
+    "W-RIPPLE": Meaning(
+        DOUBT,
+        "With more positions the peak to peak of the mesh stiffness of helical teeth may differ.",
+        "ripple of mesh stiffness",
+        "Raise static.positions.",
+    ),
     "W-ROWS": Meaning(
         NOTE,
         "Tables that no sheet can hold are left out.",

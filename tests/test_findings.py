@@ -358,6 +358,7 @@ RESULTS: dict[str, Callable[[], Iterable[Finding]]] = {
     "W-ONE-WAY": lambda: of_stage("elastic", "housing", housing(one_way_difference=[0.1, 5.0])),
     "W-OPEN": lambda: of_stage("elastic", "static", edge("mesh_force", 0.0)),
     "W-PARTED": lambda: of_stage("gearbox", "transient", transient("separating", lost=1.0)),
+    "W-RIPPLE": lambda: of_stage("elastic", "static", static(ripple_doubt=0.05)),
     "W-POSITIONS": lambda: of_stage("elastic", "static", static(peak_doubt=0.5)),
     "W-PRESSURE": lambda: of_stage("pair", "static", static(max_pressure=5e9)),
     "W-PULL": lambda: of_stage("elastic", "runup", runup(lowest=-100.0)),

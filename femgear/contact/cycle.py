@@ -19,7 +19,7 @@ from femgear import second_process
 from femgear.contact.assembly import Candidates, contact_candidates
 from femgear.contact.batch import BatchState, ContactTangents, check_definite, check_residual, solve_with_cracks
 from femgear.contact.bodies import Bodies
-from femgear.contact.face_width import FaceWidth, contact_over_width, over_slices
+from femgear.contact.face_width import FaceWidth, contact_over_width, over_slices, ripple_doubt
 from femgear.contact.flank_friction import friction_of_record
 from femgear.contact.mapped_cycle import (
     AXES,
@@ -222,7 +222,8 @@ def walk_mesh_cycle(
         )
         record = loaded if loaded.force.any() else record
     if options.helical and options.ahead is not None and not np.ndim(positions):
-        record = replace(record, **over_slices(record, options.ahead, periods=periods))
+        doubt = ripple_doubt(record, options.ahead, periods=periods)
+        record = replace(record, **over_slices(record, options.ahead, periods=periods), ripple_doubt=doubt)
         pins = pin_forces(solved, record.force, record.back_force, record.friction_force)
         record = replace(record, bearing_force=pins)
     return seen_from_front(record, planetary_set, order) if mirrored else record

@@ -252,19 +252,45 @@ def over_slices(record, ahead: np.ndarray, *, periods: int = 1) -> dict[str, np.
     its slices [mesh periods]. Tooth pairs share the mean force of their mesh as they did that of the place:
     they stay in equilibrium with it.
     """
-    step, averaged = np.ptp(ahead) / (len(ahead) - 1), {}
+    averaged = {}
     for name in _EVEN:
         values = getattr(record, name, None)
         if values is not None:
-            count = values.shape[-1]
-            mean = np.sinc(np.fft.rfftfreq(count, periods / count) * step)
-            averaged[name] = np.fft.irfft(mean * np.fft.rfft(values), n=count)
+            averaged[name] = _mean_of_steps(values, ahead, periods)
     carried = np.asarray(record.force)
     share = np.divide(averaged["force"], carried, out=np.ones(carried.shape), where=carried > 0.0)
     for name in (name for name in _OF_PAIRS if getattr(record, name, None) is not None):
         values = getattr(record, name)
         averaged[name] = values * share.reshape(len(share), *np.ones(values.ndim - 2, int), -1)
     return averaged
+
+
+def ripple_doubt(record: Any, ahead: np.ndarray, *, periods: int = 1) -> float:
+    """Estimate the share of a peak to peak by which twice the positions change the mesh stiffness of helical teeth.
+
+    It is half of what every other position changes: where slices come into contact one after the other the stiffness
+    jumps, and the error of equidistant positions goes down as their distance. Record and places of slices ``ahead``
+    are those of `over_slices`, whose means are taken of all positions and of every other one.
+    """
+    count = len(record.position)
+    # of an odd number of positions every other one comes back after two rounds
+    chosen = [np.arange(first, count, 2) for first in (0, 1)] if count % 2 == 0 else [2 * np.arange(count) % count]
+    whole = np.ptp(_mean_of_steps(record.stiffness, ahead, periods), axis=-1)
+    steady = whole <= 1e-3 * np.abs(record.stiffness).max(axis=-1, initial=0.0)
+    change = 0.0
+    for positions in chosen:
+        rounds = periods * (1 if count % 2 == 0 else 2)
+        halved = np.ptp(_mean_of_steps(record.stiffness[:, positions], ahead, rounds), axis=-1)
+        shares = np.divide(halved, whole, out=np.ones(len(whole)), where=~steady)
+        change = max(change, float(np.abs(shares - 1.0).max()))
+    return 0.5 * change
+
+
+def _mean_of_steps(values: np.ndarray, ahead: np.ndarray, periods: int) -> np.ndarray:
+    """Average values (..., P) at equidistant positions over the mesh periods from one slice to the next."""
+    count, step = values.shape[-1], np.ptp(ahead) / (len(ahead) - 1)
+    mean = np.sinc(np.fft.rfftfreq(count, periods / count) * step)
+    return np.fft.irfft(mean * np.fft.rfft(values), n=count)
 
 
 def contacts_are_lines(

@@ -146,6 +146,9 @@ class MeshCycle:
     friction_force, friction_moment : (M, P) arrays, optional
         Force of gear 1 on gear 2 along the tangent, positive as flank 1 moves there while gear 1 drives [N], and the
         sum of the same times the path coordinates of the tooth pairs, as the flanks that are loaded drive [N m].
+    ripple_doubt : float
+        Of helical teeth in slices: share of its peak to peak by which twice the positions may change a mesh stiffness,
+        as `femgear.contact.face_width.ripple_doubt` estimates it.
     """
 
     position: np.ndarray
@@ -190,6 +193,7 @@ class MeshCycle:
     alike: int = 1
     friction_force: np.ndarray | None = None
     friction_moment: np.ndarray | None = None
+    ripple_doubt: float = 0.0
 
     def extremes(self, name: str) -> tuple[np.ndarray, np.ndarray]:
         """Smallest and largest values over the record and the positions between.

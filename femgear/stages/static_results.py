@@ -393,12 +393,17 @@ class StaticResult(StageResult):
         return peaks
 
     def _doubt(self) -> dict[str, float]:
-        """Attribute peak_doubt: what the search for peaks has left, without one what spur curves show at positions."""
+        """Attribute peak_doubt: what the search for peaks has left, without one what spur curves show at positions.
+
+        Of helical teeth ripple_doubt, that of the mesh stiffness.
+        """
         cycle = self.cycle
         if cycle.between is not None:
             return {"peak_doubt": cycle.between.doubt}
-        if cycle.helical or not cycle.force.any():
+        if not cycle.force.any():
             return {}
+        if cycle.helical:
+            return {"ripple_doubt": cycle.ripple_doubt}
         curves, pitch = np.concatenate([cycle.deflection, cycle.stiffness]), self.planetary_set.base_pitch
         codes, later = (
             tooth_pair_codes(cycle.path, cycle.tooth_load, cycle.position + after, pitch)
@@ -762,6 +767,12 @@ def static_warnings(data: xr.Dataset) -> Iterator[Finding]:
             f"{percent(doubt)} of their peak to peak"
         )
         yield Finding("W-POSITIONS", "static.positions", reach, remedy="take more positions")
+    if (ripple := data.attrs.get("ripple_doubt", 0.0)) > LARGEST_PEAK_DOUBT:
+        text = (
+            f"twice the positions may change the peak to peak of the mesh stiffness by {percent(ripple)}, as slices "
+            "of helical teeth come into contact one after the other"
+        )
+        yield Finding("W-RIPPLE", "static.positions", text, remedy="take more positions")
     if ((force > 0) & (pressure <= 0)).any():
         text = (
             "at some positions every contact of a mesh lies at the end of a flank: its pressure has no limit "
@@ -1009,7 +1020,7 @@ def describe_static(data: xr.Dataset, run: Iterable[Finding] = ()) -> Block:
             significant(float(mean_over_period(row, "mesh_stiffness")) / 1e6, 3), *LARGE
         ),
         "k p-p [N/um]": lambda row: marks(
-            significant(float(peak_to_peak(row, "mesh_stiffness")) / 1e6, 3), *LARGE, "W-POSITIONS"
+            significant(float(peak_to_peak(row, "mesh_stiffness")) / 1e6, 3), *LARGE, "W-POSITIONS", "W-RIPPLE"
         ),
         "force [N]": lambda row: significant(row.mesh_force.values.mean(), 3),
         "p max [MPa]": lambda row: _pressure(float(largest_pressure(row)), marks),

@@ -1,6 +1,7 @@
 """Pairs in slices that carry far more than the plane, or where it does not touch; positions of the helix."""
 
 import math
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -8,6 +9,7 @@ from trains.pair.test_case_file import pair_case
 
 from femgear.case.gear_set import planetary_set
 from femgear.contact import face_width
+from femgear.contact.face_width import ripple_doubt, slices_ahead
 from femgear.stages.static import record_positions, solve_static
 from validation.reference.hertz import cell_influence
 
@@ -129,3 +131,23 @@ def test_positions_of_a_helix_meet_slices_alike(angle, wanted, expected):
     changes |= OWN_TIPS
     case = pair_case({**changes, "static.slices": 25, "static.positions": wanted})
     assert record_positions(case, planetary_set(case)) == expected
+
+
+def test_half_of_what_every_other_position_changes_is_the_doubt_of_the_ripple():
+    """A stiffness of one slice after the other, whose jumps lie where they please."""
+    count, ahead = 24, slices_ahead(1.3, 11)
+
+    def stiffness(position):
+        turned = np.mod(position[:, None] + ahead + 0.013, 1.0)
+        return (1.0 + 0.5 * (turned < 0.37) + 0.2 * turned).mean(axis=1)[None] * 1e8
+
+    def estimate(count):
+        return ripple_doubt(
+            SimpleNamespace(position=np.arange(count), stiffness=stiffness(np.arange(count) / count)), ahead
+        )
+
+    found = estimate(count)
+    assert found > 0.0
+    for odd in (count + 1, 3 * count + 1):
+        assert estimate(odd) > 0.0
+    assert estimate(64 * count) < 0.1 * found
