@@ -269,8 +269,8 @@ def ripple_doubt(record: Any, ahead: np.ndarray, *, periods: int = 1) -> float:
     """Estimate the share of a peak to peak by which twice the positions change the mesh stiffness of helical teeth.
 
     It is half of what every other position changes: where slices come into contact one after the other the stiffness
-    jumps, and the error of equidistant positions goes down as their distance. Record and places of slices ``ahead``
-    are those of `over_slices`, whose means are taken of all positions and of every other one.
+    jumps, and the error of equidistant positions goes down as their distance. Record and ``ahead``
+    (slices,) are those of `over_slices`, whose means are taken of all positions and of every other one.
     """
     count = len(record.position)
     # of an odd number of positions every other one comes back after two rounds
