@@ -37,6 +37,8 @@ MOST_FILES = 200
 """Files and folders that are listed."""
 LONGEST_RUN = 3600.0
 """Longest time of a command [s]."""
+_ENDS_WITHIN = 30.0
+"""Time that a command has to end by itself once its call is cancelled [s]."""
 _LOOKED_EVERY = 0.2
 """Between two looks whether a call was cancelled [s]."""
 _CANCELLED = ContextVar[threading.Event | None]("cancelled", default=None)
@@ -143,7 +145,7 @@ def _run_until_cancelled(arguments: list[str], folder: Path) -> subprocess.Compl
                     raise
                 if cancelled is not None and cancelled.is_set() and not asked_to_end:
                     process.terminate()  # once: it ends as by Ctrl-C, and files stay whole
-                    asked_to_end = True
+                    end, asked_to_end = min(end, time.monotonic() + _ENDS_WITHIN), True
 
 
 def command(folder: Path, *arguments: str) -> dict[str, Any]:

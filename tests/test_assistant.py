@@ -7,6 +7,7 @@ import json
 import subprocess
 import sys
 import threading
+import time
 from importlib.util import find_spec
 from pathlib import Path
 
@@ -235,3 +236,23 @@ def test_a_cancelled_call_ends_its_process(tmp_path, monkeypatch):
             return await asyncio.to_thread(ended.wait, 30)
 
     assert asyncio.run(cancel())
+
+
+def test_a_command_that_does_not_end_when_it_is_asked_to_is_killed(tmp_path, monkeypatch):
+    cancelled, place = threading.Event(), tmp_path / "begun"
+    monkeypatch.setattr(assistant, "_ENDS_WITHIN", 0.5)
+    deaf = "import pathlib, signal, time; signal.signal(signal.SIGTERM, signal.SIG_IGN)"
+    begin = f"pathlib.Path({str(place)!r}).touch()"
+
+    def cancel_when_begun():
+        while not place.exists():
+            time.sleep(0.05)
+        cancelled.set()
+
+    token = assistant._CANCELLED.set(cancelled)
+    try:
+        threading.Thread(target=cancel_when_begun, daemon=True).start()
+        with pytest.raises(subprocess.TimeoutExpired):
+            assistant._run_until_cancelled([sys.executable, "-c", f"{deaf}; {begin}; time.sleep(60)"], tmp_path)
+    finally:
+        assistant._CANCELLED.reset(token)

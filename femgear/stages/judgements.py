@@ -364,7 +364,7 @@ def judge_lives(
 def _hours(hours: float) -> str:
     """Write a life with its unit: whole hours with separators of thousands."""
     if math.isinf(hours):
-        return "without end"
+        return "last without end"
     return f"{hours:,.0f} h" if hours >= 100.0 else f"{hours_text(hours)} h"
 
 

@@ -26,6 +26,8 @@ STEEL = {"treatment": "case hardened steel", "hardness": 720}
 def tables(*load_cases, steel=STEEL, **operation):
     """Tables of a pair with load cases."""
     changed = copy.deepcopy(TABLES)
+    for key in ("treatment", "hardness"):
+        del changed["material"][key]
     changed["material"] |= steel
     changed["operation"] |= {"load_case": list(load_cases)} | operation
     return changed

@@ -125,7 +125,7 @@ def test_a_name_that_nothing_has_is_refused_with_the_nearest():
 def test_entries_of_strength_and_oil_without_effect_are_told():
     tables = tomllib.loads(Path("cases/spur_pair.toml").read_text(encoding="utf-8"))
     assert not list(idle_materials_and_oil(read_case(tables)))
-    tables["material"]["hardness"] = 700
+    del tables["material"]["treatment"]
     tables["lubricant"] = {"viscosity": "30 mm^2/s"}
     tables["gear_2"]["material"] = {"grade": "ME"}
     assert [told.key for told in idle_materials_and_oil(read_case(tables))] == [

@@ -224,7 +224,9 @@ def check_equal(one, every, rounding):
     """All arrays of two cycles agree to a share of their largest value."""
     for name in (field.name for field in fields(MeshCycle)):
         a, b = getattr(one, name), getattr(every, name)
-        if not isinstance(b, np.ndarray) or b.dtype.kind != "f":
+        if name == "ripple_doubt":
+            assert a == pytest.approx(b, rel=1e-6), name
+        elif not isinstance(b, np.ndarray) or b.dtype.kind != "f":
             assert np.array_equal(a, b), name
         elif name != "residual":
             # cells at a corner are a thousandth of a window wide: they show the rounding of separations

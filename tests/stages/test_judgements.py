@@ -155,7 +155,7 @@ def test_lives_are_judged_by_the_one_asked_for(required, state, words):
     lives = [("teeth", math.inf, "the root of gear 1"), ("bearings", 7605.0, "bearing C")]
     (judgement,) = judge_lives(lives, required)
     assert (judgement.state, judgement.sentence) == (state, words)
-    assert judgement.answer == "teeth without end, bearings 7,605 h"
+    assert judgement.answer == "teeth last without end, bearings 7,605 h"
 
 
 def test_lives_without_end_hold_and_none_is_not_judged():

@@ -79,7 +79,7 @@ def test_load_cases_without_load_count_in_the_time_alone(planetary):
 
 
 def test_gears_without_a_limit_or_a_treatment_have_none():
-    pair = read_case(CASES / "spur_pair.toml")
+    pair = with_values(read_case(CASES / "spur_pair.toml"), {"material.treatment": None, "material.hardness": None})
     assert not spectra_of(with_values(pair, {"material.root_stress_limit": "430 MPa"}), (200.0, 600.0, 1.0))
     given = {"gear_2.material.treatment": "nitrided steel", "gear_2.material.root_stress_limit": "400 MPa"}
     mixed = spectra_of(with_values(pair, given | {"gear_2.material.hardness": 700}), (200.0, 600.0, 1.0))

@@ -67,7 +67,7 @@ def test_a_pair_with_limits_is_rated_and_has_no_level():
 def test_a_pair_without_limits_says_why_it_is_not_rated_and_that_it_runs_smoothly():
     calm = {"drive_contact": ("speed", [1.0]), "stable": ("speed", [1]), "dynamic_factor": ("speed", [1.1])}
     run_up = xr.Dataset({"dynamic_factor": ("speed", [1.02, 1.31, 1.2])}, {"speed": [500.0, 1000.0, 1500.0]})
-    case = read_case(CASES / "spur_pair.toml")
+    case = with_values(read_case(CASES / "spur_pair.toml"), {"material.treatment": None, "material.hardness": None})
     run = Files(case, dynamics=xr.Dataset(calm), runup=run_up)
     run.dynamics["mesh"] = ("mesh", ["gear 1-gear 2"])
     run.findings = case.notices

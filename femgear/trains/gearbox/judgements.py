@@ -40,13 +40,15 @@ from femgear.stages.strength import OF_ROOTS
 from femgear.stages.strength_results import SYMBOLS, taken_as_one
 from femgear.stages.tooth_faults import fault_words
 from femgear.trains.gearbox.case_file import PairSection, teeth_of
-from femgear.trains.gearbox.mode_words import near_mode
+from femgear.trains.gearbox.mode_words import near_mode, nearest_mesh_words
 from femgear.trains.gearbox.response_results import OF_BOX_RESPONSE, line_origin, main_way
 from femgear.trains.gearbox.silence import silence_words
 from femgear.trains.gearbox.strength import flank_of_shafts, least_safety
 
 _CALM = 1.01
 """Largest mesh force over its mean below which forces do not vary to speak of."""
+_UNEVEN = 1.2
+"""Largest mesh force over its mean from which on page one tells the mesh line that is nearest to a mode."""
 _IDLE = 1e-3
 """Mean force of a mesh over the largest force of all up to which it carries nothing that a ratio would tell about."""
 _ACCELERATIONS = ("m/s²", 1.0), ("mm/s²", 1e-3), ("µm/s²", 1e-6)
@@ -199,7 +201,11 @@ def _largest_force(results: Any) -> str:
     begin = "In the run-up its" if stage == "runup" else "Its"
     if largest < _CALM:
         return f"{begin} mesh forces stay within {percent(_CALM - 1.0)} of their mean"
-    return f"{begin} mesh forces reach {largest:.2f} times their mean ({where})"
+    near = ""
+    if stage == "dynamics" and largest > _UNEVEN and "modes" in results.stages:
+        words = nearest_mesh_words(results.modes)
+        near = f"; nearest to a mode is the {words}" if words else ""
+    return f"{begin} mesh forces reach {largest:.2f} times their mean ({where}){near}"
 
 
 def _unheard(results: Any) -> Judgement:

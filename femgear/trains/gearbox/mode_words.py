@@ -31,6 +31,15 @@ def nearest_mesh_line(data: Any) -> tuple[str, float, float]:
     return *lines[line], float(modes[mode])
 
 
+def nearest_mesh_words(data: Any) -> str:
+    """Write the mesh line of modes.nc that is nearest to a mode, how far it is from it, and the mode; empty without."""
+    name, line, mode = nearest_mesh_line(data)
+    if not name:
+        return ""
+    apart = f"{100.0 * abs(line / mode - 1.0):.3g} % {'below' if line < mode else 'above'}"
+    return f"{name}, {line:,.0f} Hz, {apart} {nearest_mode(data, mode)}"
+
+
 def mesh_lines_and_modes(data: Any) -> tuple[np.ndarray, list[tuple[str, float]], np.ndarray]:
     """Find how far mesh lines are from modes of modes.nc: |ln f/f_m| (L, m), lines with names [Hz], modes [Hz].
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from femgear.case.quantities import RPM
-from femgear.findings import Finding, percent
+from femgear.findings import NOTE, Finding, percent
 from femgear.housing.sound import REFERENCE_ACCELERATION, a_weighting
 from femgear.report.tables import Block, in_decibels, tabulate
 from femgear.stages.protocol import StageResult
@@ -37,6 +37,8 @@ _FORCE_CHANGE = 0.05
 """Relative change of the largest mesh force by a longer excitation that is told."""
 _CROSS = 0.05
 """Force by the stiffness of a stage on the motion of another one, over its dynamic force, that is told."""
+_CROSS_READ, _CROSS_HEARD = 1e-3, 0.01
+"""Shares of the mean mesh force and of the level that it makes up to which it is a note: the third digit, 0.1 dB."""
 _TAIL = 0.05
 """Share of mesh forces at the outer side bands that is told."""
 _CANCELS = 1.5
@@ -481,7 +483,21 @@ def _cross_finding(data: xr.Dataset) -> Finding:
     if "level_of_stage" in data:
         share = data["level_of_stage"].values[speed, :, stage] / data["level"].values[speed]
         text += f", {largest * np.nanmax(share):.2g} of the level at {data['sensor'].values[int(np.nanargmax(share))]}"
-    return Finding("W-CROSS", "", text, limit=percent(_CROSS))
+    severity = "" if _cross_matters(data) else NOTE
+    return Finding("W-CROSS", "", text, limit=percent(_CROSS), severity=severity)
+
+
+def _cross_matters(data: xr.Dataset) -> bool:
+    """Tell whether what a stage after the other leaves out changes a mesh force or a level by what one reads."""
+    cross, dynamic = data["cross_excitation"].values, (data["mesh_force_rms"] / data["mean_force"]).values
+    left_out = np.where(cross > _CROSS, cross, 0.0).max(axis=2)  # (speed, stage)
+    of_mean = left_out * np.nan_to_num(dynamic, nan=0.0).max(axis=2)
+    if of_mean.max() > _CROSS_READ:
+        return True
+    if "level_of_stage" not in data:
+        return False
+    share = data["level_of_stage"].values / data["level"].values[:, :, None]  # (speed, sensor, stage)
+    return bool((left_out[:, None] * np.nan_to_num(share)).max(initial=0.0) > _CROSS_HEARD)
 
 
 def _of_speeds(speeds: np.ndarray, chosen: np.ndarray) -> str:

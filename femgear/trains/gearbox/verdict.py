@@ -22,13 +22,17 @@ from femgear.stages.losses_results import efficiency_rows
 from femgear.stages.planet_bearings import planet_bearing_rows
 from femgear.trains.gearbox.casing_results import largest_foot_force
 from femgear.trains.gearbox.life import shortest_life
-from femgear.trains.gearbox.mode_words import MESH_LINES, near_mode, nearest_mesh_line, nearest_mode
+from femgear.trains.gearbox.mode_words import MESH_LINES, near_mode, nearest_mesh_words
 from femgear.trains.gearbox.response_results import OF_BOX_RESPONSE, SENSORS_JUDGED, line_origin, main_way
 from femgear.trains.gearbox.strength import smallest_safeties
 from femgear.trains.gearbox.stress import box_reason_rows
 
 _ROUNDING = 1e-9
 """Share of the mesh forces under which the force of a bearing is rounding: planets balance one another."""
+_ALIGNED = 1e-9
+"""Misalignment [m] below which teeth are in line: no flank is ground to that, and stiff shafts have none."""
+_SHARES_NAMED = 4
+"""Different shares of torque that are named one by one; of more of them the smallest and the largest one."""
 _OF_TEETH = "W-PASSES", "W-DEFLECTION", "W-STIFFNESS", "W-FACE-LOAD", "W-OPEN"
 _OF_BEARINGS = "W-PASSES", "W-DEFLECTION", "W-STIFFNESS", "W-BEARING", "W-PLAY"
 
@@ -70,8 +74,9 @@ def _worst_of_deflection(data: Any, marks: Marks) -> Iterator[tuple[str, str]]:
     if len(meshes):
         misaligned = data["mesh_misalignment"].values
         at = np.unravel_index(int(np.abs(misaligned).argmax()), misaligned.shape)
-        text = of_teeth(f"{1e6 * misaligned[at]:+.2f} µm")
-        yield "largest misalignment over the width", f"{text}, {where(at, meshes)}"
+        if abs(misaligned[at]) >= _ALIGNED:
+            text = of_teeth(f"{1e6 * misaligned[at]:+.3g} µm")
+            yield "largest misalignment over the width", f"{text}, {where(at, meshes)}"
         factor = data["face_load_factor"].values
         if np.isfinite(factor).any():
             at = np.unravel_index(int(np.nanargmax(factor)), factor.shape)
@@ -90,6 +95,10 @@ def _worst_of_deflection(data: Any, marks: Marks) -> Iterator[tuple[str, str]]:
             if np.isfinite(value):
                 stages.setdefault(percent(value, 1), []).append(str(name))
         parts = [f"{merged_names(names)} {value}" for value, names in stages.items()]
+        if len(parts) > _SHARES_NAMED:
+            low, high = (order(share[at][np.isfinite(share[at])]) for order in (np.min, np.max))
+            ends = zip(("from", "to"), (percent(low, 1), percent(high, 1)), strict=True)
+            parts = [" ".join(f"{end} {value} ({merged_names(stages[value])})" for end, value in ends)]
         case = f", {cases[at]}" if len(cases) > 1 else ""
         yield "torque of stages side by side", f"{of_teeth(', '.join(parts))}{case}"
     if len(bearings):
@@ -104,10 +113,7 @@ def _worst_of_deflection(data: Any, marks: Marks) -> Iterator[tuple[str, str]]:
 
 def _nearest_mode(data: Any) -> Iterator[tuple[str, str]]:
     """The mode that a mesh line comes nearest at the speed of operation."""
-    name, line, mode = nearest_mesh_line(data)
-    if name:
-        apart = f"{100.0 * abs(line / mode - 1.0):.3g} % {'below' if line < mode else 'above'}"
-        text = f"{name}, {line:,.0f} Hz, {apart} {nearest_mode(data, mode)}"
+    if text := nearest_mesh_words(data):
         yield f"mesh line up to harmonic {MESH_LINES} nearest to a mode", text
 
 

@@ -13,7 +13,7 @@ from femgear.findings import DOUBT, Finding, percent
 from femgear.stages.judgements import QUIET, SMOOTH, STRONG, SURE
 from femgear.trains.gearbox import judgements
 from femgear.trains.gearbox.judgements import gearbox_judgements
-from femgear.trains.gearbox.mode_words import near_mode
+from femgear.trains.gearbox.mode_words import near_mode, nearest_mesh_words
 
 pytestmark = pytest.mark.usefixtures("coarse_states")
 
@@ -161,6 +161,21 @@ def test_teeth_that_were_looked_at_by_balance_alone_have_their_largest_force(res
     rattling.balance = xr.Dataset({name: ("mesh", values) for name, values in forces.items()})
     smooth = {judgement.question: judgement for judgement in gearbox_judgements(rattling)}[SMOOTH]
     assert smooth.answer == "largest mesh force 1.500 of its mean" and smooth.limit == "teeth stay in contact"
+
+
+@pytest.mark.parametrize(("factor", "near"), [(1.1, False), (1.5, True)])
+def test_a_gearbox_without_sensors_says_which_mesh_line_is_nearest_to_a_mode_where_forces_are_large(
+    results, factor, near
+):
+    silent, response = Files(**vars(results)), results.dynamics
+    silent.stages = ("deflection", "modes", "dynamics")
+    silent.case = results.case.model_copy(update={"sensor": ()})
+    factors = np.full(response["dynamic_factor"].shape, factor)
+    silent.dynamics = _with(response, dynamic_factor=factors)
+    silent.dynamics.sizes = {"sensor": 0, "speed": 1}
+    sentence = {judgement.question: judgement for judgement in gearbox_judgements(silent)}[QUIET].sentence
+    assert sentence.startswith(f"Its mesh forces reach {factor:.2f} times their mean (stage at ")
+    assert sentence.endswith(f"; nearest to a mode is the {nearest_mesh_words(results.modes)}") == near
 
 
 def _with(data, **values):

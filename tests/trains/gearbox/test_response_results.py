@@ -8,6 +8,7 @@ import xarray as xr
 from casings import RPM, pair_in_a_casing, response
 from planet_gearboxes import COUNTED, in_casing, responded, simple_set
 
+from femgear.findings import DOUBT, NOTE
 from femgear.housing.sound import a_weighting
 from femgear.trains.gearbox.response import solve_gearbox_response
 from femgear.trains.gearbox.response_results import (
@@ -126,6 +127,16 @@ def test_stages_that_change_one_another_are_told(data):
     assert finding.code == "W-CROSS"
     part = 0.2 * float((data["mesh_force_rms"] / data["mean_force"]).values[1, 0, 0])
     assert "20 %" in finding.text and f"{part:.2g} of its mean force, 0.2 of the level at" in finding.text
+    assert finding.severity == DOUBT
+    # what is left out of a stage that makes nothing of the level, and hardly a force, is a note
+    small = data.assign(
+        cross_excitation=cross, mesh_force_rms=1e-4 * data["mean_force"], level_of_stage=0.04 * data["level_of_stage"]
+    )
+    (finding,) = gearbox_response_warnings(small)
+    assert (finding.code, finding.severity) == ("W-CROSS", NOTE)
+    for name, value in (("mesh_force_rms", 0.006 * data["mean_force"]), ("level_of_stage", data["level_of_stage"])):
+        (finding,) = gearbox_response_warnings(small.assign({name: value}))
+        assert finding.severity == DOUBT
 
 
 def test_peaks_between_the_speeds_of_a_run_up_are_told(data):

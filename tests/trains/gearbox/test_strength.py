@@ -99,7 +99,9 @@ def test_without_contact_the_torque_of_a_stage_rates_its_teeth():
     nominal = rate_case(teeth, torque=torque, strength=StrengthSection(edition=2006)).nominal
     assert [flank.root_stress for flank in pair.flanks] == pytest.approx(nominal.root[0].tolist(), rel=1e-12)
     assert all(flank.root_factor == 1.0 for flank in pair.flanks)
-    assert not rated_stages(solve_deflection(with_values(axle, {"deflection.contact": False})))
+    teeth = "pair[0].teeth.material", "planetary[0].teeth.material"
+    plain = {f"{of}.{key}": None for of in teeth for key in ("treatment", "hardness")}
+    assert not rated_stages(solve_deflection(with_values(axle, {"deflection.contact": False} | plain)))
 
 
 def test_stages_are_rated_with_their_own_sharing_and_face_load(planetary):
@@ -124,7 +126,7 @@ def test_nothing_is_stored_where_nothing_asks(planetary):
 def test_stages_and_gears_that_carry_without_a_safety_are_named(pair):
     """Stages: rated, without limits, with those of gear 1 alone, and one that carries nothing."""
     case, gear_1 = (
-        read_case(CASES / "spur_pair.toml"),
+        with_values(read_case(CASES / "spur_pair.toml"), {"material.treatment": None, "material.hardness": None}),
         {key.replace("material", "gear_1.material"): value for key, value in LIMITS.items()},
     )
     cases = {"first": pair, "second": case, "third": with_values(case, gear_1), "idle": case}

@@ -1,5 +1,6 @@
 """The verdict of a gearbox: worst numbers with their place, levels with the line, the way and the mode behind them."""
 
+from collections import ChainMap
 from types import SimpleNamespace
 
 import numpy as np
@@ -48,6 +49,31 @@ def test_doubtful_numbers_are_marked(results):
     changed = {name for (name, text), (_, before) in zip(block.rows, plain.rows, strict=True) if text != before}
     assert {"level at top", "largest face load factor K_Hβ", "largest bearing force"} <= changed
     assert "loudest of the run-up at top" not in changed
+
+
+def test_teeth_in_line_have_no_misalignment_in_the_verdict(results):
+    name, data = "largest misalignment over the width", results.deflection
+    (block,) = gearbox_verdict(results)
+    largest = 1e6 * np.abs(data["mesh_misalignment"].values).max()
+    assert abs(float(dict(block.rows)[name].split()[0])) == pytest.approx(largest, rel=1e-2)
+    aligned = SimpleNamespace(**vars(results))
+    values = 1e-6 * data["mesh_misalignment"].values
+    aligned.deflection = data.assign(mesh_misalignment=(("load_case", "mesh"), values))
+    (block,) = gearbox_verdict(aligned)
+    assert name not in dict(block.rows)
+
+
+def test_of_many_stages_side_by_side_those_with_the_smallest_and_the_largest_share_are_named(results):
+    wide, shares = SimpleNamespace(**vars(results)), np.array([[0.31, 0.35, 0.33, 0.33, 0.34, 0.32]])
+    names = np.array(
+        ["planet 1-ring", "planet 2-ring", "sun-planet 1", "sun-planet 2", "sun-planet 3", "planet 3-ring"]
+    )
+    for count, text in ((6, "from 31.0 % (planet 1-ring) to 35.0 % (planet 2-ring)"), (2, "planet 1-ring 31.0 %, ")):
+        of_stages = {"stage": names[:count], "torque_share": shares[:, :count]}
+        of_stages = {name: SimpleNamespace(values=values) for name, values in of_stages.items()}
+        wide.deflection = ChainMap(of_stages, results.deflection)
+        (block,) = gearbox_verdict(wide)
+        assert dict(block.rows)["torque of stages side by side"].startswith(text)
 
 
 def test_decibels_are_those_of_iso_1683():
