@@ -291,9 +291,11 @@ def judge_strength(
     limit = "; ".join(filter(None, (limit, open_factors, missing, reasons)))
     if low:
         failing = " and ".join(
-            f"{symbol} {least.value:.2f} {_AGAINST[symbol]} ({least.where})" for symbol, least, _ in low
+            f"{symbol} {least.value:.2f} of {required:g} needed {_AGAINST[symbol]} ({least.where})"
+            for symbol, least, required in low
         )
-        return Judgement(STRONG, "bad", answer, limit, f"Not strong enough, for {margin:.2g} times the load: {failing}")
+        part = f", only for {margin:.2g} times the load" if math.isfinite(margin) else ""
+        return Judgement(STRONG, "bad", answer, limit, f"Not strong enough{part}: {failing}")
     faulty = "W-FAULT" in doubts and bool(_raised(findings, ("W-FAULT",)))
     doubted = "With doubts strong" if ", " in reasons else "With a doubt strong" if reasons else "Strong"
     begin = "But for the faulty teeth strong enough" if faulty else f"{doubted} enough"

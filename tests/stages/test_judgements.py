@@ -49,15 +49,16 @@ def test_safeties_are_judged_by_those_asked_for():
     fails = judge_strength(ROOT, FLANK, more)
     assert fails.state == "bad" and fails.limit.endswith("ISO 6336:2006, reached at 0.94 times the load")
     assert (
-        fails.sentence == "Not strong enough, for 0.94 times the load: S_F 1.92 against breakage (root of the planet) "
-        "and S_H 1.21 against pitting (flank of the sun)"
+        fails.sentence == "Not strong enough, only for 0.94 times the load: S_F 1.92 of 2 needed against breakage "
+        "(root of the planet) and S_H 1.21 of 1.25 needed against pitting (flank of the sun)"
     )
     # root stress grows with the load, pressure with its root: at 0.94 = 1.21²/1.25² times the load S_H is 1.25
     assert (1.21 / 1.25) ** 2 == pytest.approx(0.94, abs=0.005) and 1.92 / 2.0 > 0.94
     assert "times the load" not in judge_strength(Least(math.nan, ""), FLANK, asked).limit
     # a safety that is exactly the one asked for holds, one without a number does not
     assert judge_strength(Least(1.4, ""), Least(1.0, ""), asked).state == "good"
-    assert judge_strength(Least(math.nan, ""), FLANK, asked).state == "bad"
+    unknown = judge_strength(Least(math.nan, ""), FLANK, asked)
+    assert unknown.state == "bad" and unknown.sentence.startswith("Not strong enough: S_F nan of ")
 
 
 def test_strength_without_limits_is_open_and_half_of_it_deserves_a_look():
