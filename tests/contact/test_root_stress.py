@@ -9,10 +9,13 @@ import pytest
 
 from femgear.contact.bodies import flank_compliance, flank_stations, make_bodies, make_sectors
 from femgear.contact.cycle import CycleOptions, walk_mesh_cycle
+from femgear.contact.face_width import slices_ahead
+from femgear.contact.flank_pairs import mesh_pairs
 from femgear.contact.root_stress import (
     BACK,
     LOADED,
     RootCycle,
+    RootStresses,
     _between_slices,
     computed_waves,
     observed_root_stress,
@@ -30,6 +33,8 @@ from femgear.gears.deviations import no_deviations
 from femgear.gears.gear import Gear
 from femgear.gears.iso6336_root import nominal_root_stress
 from femgear.gears.tooth import half_sector
+from femgear.stages.static import solve_static
+from femgear.trains.reading import read_case, with_values
 from validation.planetary import reference_set
 from validation.reference.plane_elasticity import stress
 from validation.reference.root_stress import set_root_stress
@@ -237,6 +242,21 @@ def test_slices_have_the_mean_of_their_loads():
     # all waves alike are no waves: every slice has its own load
     assert between.sum(axis=0) == pytest.approx(np.eye(9), abs=1e-12)
     assert computed_waves(25)[[0, -1]] == pytest.approx([1.0, 24.0])
+
+
+def test_loads_of_helical_slices_lie_on_the_path_of_contact():
+    """The slice that runs ahead carries where its own place on the path is, not that of mid-width."""
+    coarse = {"static.positions": 8, "static.flank_elements": 6, "static.slices": 9, "static.stresses": False}
+    static = solve_static(with_values(read_case("cases/helical_23_24_73.toml"), coarse))
+    gears, cycle = static.planetary_set, static.cycle
+    stresses = RootStresses((), ahead=slices_ahead(static.overlap_ratio, cycle.slice_load.shape[2]))
+    ends = np.array([mesh_pairs(gears)[kind].path for kind in gears.mesh_kind])
+    slices = stresses.loads(gears, cycle, reverse=False)
+    assert len(slices) == 9
+    for loads in slices:
+        path = np.where(loads.load > 0.0, loads.path, np.nan)
+        beyond = np.fmax(ends[:, 0] - np.nanmin(path, axis=(1, 2)), np.nanmax(path, axis=(1, 2)) - ends[:, 1])
+        assert beyond.max() < 0.3 * gears.base_pitch
 
 
 @pytest.fixture(scope="module")

@@ -124,3 +124,8 @@ def test_teeth_that_make_no_set_are_refused_and_rough_ones_remarked_on():
     assert "overlap by" in said
     with pytest.raises(GeometryError, match="E-NEIGHBOURS"):
         check_teeth(MeshPhasing(30, 70, tuple(range(0, 100, 10))), 20)
+
+
+def test_without_a_tolerance_the_same_ratio_alone_is_found():
+    found = neighbouring_teeth(30, 20, 70, 4, distance=3, ratio_tolerance=0.0, fitting=False)
+    assert [30, 20, 70] in found.teeth.tolist() and not np.any(found.ratio - (1.0 + 70.0 / 30.0))
