@@ -310,66 +310,6 @@ class PolynomialSprings:
         return force[..., None], slope[..., None, None]
 
 
-@dataclass(frozen=True)
-class TurningSprings:
-    """Isotropic springs between centres whose coordinates turn against one another.
-
-    With ``z = x + i y``, ``d = z_1 - z_2 exp(i phi)`` in the first frame and phi the angle of the second
-    frame seen from the first; the forces are ``k d`` on the first and ``-k d exp(-i phi)`` on the second
-    centre, of the energy ``k |d|^2 / 2``.
-
-    CaseError: columns that do not fit (E-SHAPE), stiffnesses out of range (E-RANGE).
-
-    Parameters
-    ----------
-    columns : (g, 4) int array
-        x and y of the first, x and y of the second centre.
-    stiffness : (g,) array
-        [N/m]
-    wave : FourierSeries
-        ``cos phi`` and ``sin phi``, from `turning_wave`.
-    """
-
-    columns: np.ndarray
-    stiffness: np.ndarray
-    wave: FourierSeries
-
-    # linear in the deflections: a grid of few samples is exact
-    degree = 1
-
-    def __post_init__(self):
-        columns, stiffness = _columns(self.columns, 4), np.atleast_1d(np.array(self.stiffness, float))
-        if len(columns) != len(stiffness):
-            raise CaseError(
-                f"columns {columns.tolist()} for {len(stiffness)} springs",
-                code="E-SHAPE",
-                limit="four column numbers of W a spring",
-            )
-        if not np.all(np.isfinite(stiffness)) or np.any(stiffness < 0.0):
-            raise CaseError(f"lateral stiffnesses {stiffness.tolist()} N/m", code="E-RANGE", limit="finite, 0 or more")
-        stiffness.setflags(write=False)
-        object.__setattr__(self, "columns", columns)
-        object.__setattr__(self, "stiffness", stiffness)
-
-    @property
-    def reference(self) -> np.ndarray:
-        """Every centre held by its spring, (g, 4) [N/m]."""
-        return np.repeat(self.stiffness[:, None], 4, axis=1)
-
-    def evaluate(self, x, theta):
-        """Compute forces (..., g, 4) [N] and tangents (..., g, 4, 4) [N/m] at phases (..., n_bases) [rad]."""
-        c, s = np.moveaxis(self.wave.at(theta), -1, 0)
-        # d = D x with x = (x_1, y_1, x_2, y_2)
-        D = np.zeros((*c.shape, 2, 4))
-        D[..., 0, 0] = D[..., 1, 1] = 1.0
-        D[..., 0, 2], D[..., 0, 3] = -c, s
-        D[..., 1, 2], D[..., 1, 3] = -s, -c
-        square = np.swapaxes(D, -1, -2) @ D
-        tangent = self.stiffness[:, None, None] * square[..., None, :, :]
-        force = (tangent @ x[..., None])[..., 0]
-        return force, np.broadcast_to(tangent, (*force.shape, 4))
-
-
 def turning_wave(orders: tuple[int, ...], *, phase: float = 0.0) -> FourierSeries:
     """Make the cosine and sine of ``phi = phase + orders . theta`` as two coefficients.
 

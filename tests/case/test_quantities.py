@@ -170,3 +170,8 @@ def test_ends_of_a_window_are_in_it_in_every_unit(text):
     for beyond in ("0.9999999 nm", "20.000001 um"):
         with pytest.raises(CaseError):
             to_si(beyond, LENGTH, low=1e-9, high=2e-5)
+
+
+def test_whole_parts_of_a_unit_are_divided_to_the_last_digit():
+    """51 times 0.001 is not the number 0.051."""
+    assert 51 * 0.001 != 0.051 and to_si("51 mm", LENGTH) == 0.051

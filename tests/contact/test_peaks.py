@@ -275,3 +275,11 @@ def test_a_record_that_does_not_close_has_its_end():
     tau, ramp = np.arange(9) / 8, np.arange(9.0)
     places, doubt = open_places(tau, ramp[None], np.zeros((1, 9), int), np.zeros(1), 1)
     assert not len(places) and doubt == 0.0
+
+
+def test_where_pairs_change_a_curve_may_rise_by_its_steepest_slope_nearby():
+    """Half of the rise that the slope before it, of 5 a period, makes over an interval of 0.2 periods."""
+    position, curve = np.arange(5) / 5.0, np.array([[0.0, 0.0, 1.0, 1.0, 1.0]])
+    other = np.arange(5) == 2
+    assert peak_doubt(position, curve, np.array([1e-3]), 1, other) == pytest.approx(0.5, rel=1e-12)
+    assert peak_doubt(position, curve, np.array([1e-3]), 1) == 0.0

@@ -10,7 +10,7 @@ from small_trains import example_pair, lightly_loaded_pair
 
 from femgear.errors import CaseError, ConvergenceError
 from femgear.solvers.periodic.harmonic_balance import solve_harmonic_balance
-from femgear.solvers.stability.lyapunov import _check_sum, _Stepped, lyapunov_exponents, pieces
+from femgear.solvers.stability.lyapunov import _check_sum, _Stepped, _weighted, lyapunov_exponents, pieces
 from femgear.solvers.time.transient import solve_transient
 from femgear.system.force_laws import GearMeshes, PolynomialSprings
 from femgear.system.fourier import FourierSeries, constant
@@ -214,3 +214,8 @@ def test_small_motions_are_made_orthogonal_before_they_fade():
         assert np.exp(-rate * period / count) >= np.exp(-3.0) * (1.0 - 1e-12)
         assert count == 4 or np.exp(-rate * period / (count - 1)) < np.exp(-3.0)
     assert pieces(np.diag([1e6, 0.0]), 2.0) == 1000
+
+
+def test_the_weighted_mean_of_a_ramp_is_its_middle():
+    """Weights that fade towards both ends are those of a symmetric window."""
+    assert _weighted(np.arange(21.0)[:, None, None]).item() == pytest.approx(10.0, rel=1e-12)

@@ -393,3 +393,11 @@ def test_a_step_that_does_not_converge_ends_the_motion_with_a_message():
     found = solve_transient(oscillator(elements=[spring]), 0.0, [0.0, 1.0, 50.0], start=([1.0], [0.0]), step=0.5)
     assert not found.converged and "shorten" in found.message
     assert np.isnan(found.displacement[-1]).all() and np.isfinite(found.displacement[1]).all()
+
+
+def test_newton_iterations_of_all_blocks_are_counted():
+    """A hardening spring: about one for each of the steps of many blocks."""
+    system = MechanicalSystem(np.eye(1), 0.1 * np.eye(1), np.eye(1), np.eye(1), np.zeros(1), ("x",))
+    problem = NonlinearSystem(system, (PolynomialSprings([0], [[0.0, 0.0, 1.0]]),), (HarmonicForce([0.5]),))
+    found = solve_transient(problem, 1.0, [0.0, 20.0], step=0.01)
+    assert found.converged and 0.5 * found.steps < found.iterations < 10 * found.steps
