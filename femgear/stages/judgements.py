@@ -710,7 +710,7 @@ def judge_noise(
     resonance : str
         The resonance that makes the level at a speed of operation, empty where there is none.
     open_words : str
-        What to say where there is no limit: which entry gives one.
+        What to say where there is neither a limit nor a resonance: which entry gives a limit.
     margins : sequence of LevelMargin
         Of the levels that have a limit.
     doubts : str
@@ -732,13 +732,15 @@ def judge_noise(
             return Judgement(QUIET, "bad", answer, doubted(worst.words), f"{sentence}. Too loud: {worst.words}")
         state: State = "look" if resonance or doubts else "good"
         return Judgement(QUIET, state, answer, doubted(resonance, worst.words), sentence)
-    return Judgement(QUIET, "look" if resonance or doubts else "open", answer, doubted(resonance, open_words), sentence)
+    return Judgement(
+        QUIET, "look" if resonance or doubts else "open", answer, doubted(resonance or open_words), sentence
+    )
 
 
-def no_limit_words(entries: str, resonances_known: bool, resonance: str) -> str:
-    """Say that a level has no limit, which entries give one, and that no resonance makes it where that is known."""
-    clear = f"{CLEAR}; " if resonances_known and not resonance else ""
-    return f"{clear}no limit: give {entries}"
+def no_limit_words(entry: str, resonances_known: bool) -> str:
+    """Say that a level has no limit, which entry gives one, and that no resonance makes it where they are known."""
+    clear = f"{CLEAR}; " if resonances_known else ""
+    return f"{clear}no limit: give {entry}"
 
 
 def _doubts_by_code(doubts: Sequence[Finding]) -> str:

@@ -50,12 +50,12 @@ def _noise(results: Any) -> Judgement:
     level, speeds = housing["level"].values, housing["speed"].values
     at = int(level.argmax())
     speed = float(speeds[at])
-    at_microphone, compared, limits = "", "", "housing.level_limit"
+    at_microphone, compared, limit_entry = "", "", "housing.level_limit"
     if "pressure_level" in housing:
         sound = float(housing["pressure_level"][at])
         at_microphone = f" ({sound:.1f} dB(A) at the microphone)"
         compared = f", {voice_words(sound)}"
-        limits += " or housing.microphone.level_limit"
+        limit_entry = "housing.microphone.level_limit"
     marks = Marks(results.findings)
     level_words = marked_level(results, at, marks, level_doubts(results, [at]).get(at, ()), digits=3)
     size_words = f"{level_words} m/s² r.m.s.{at_microphone}"
@@ -89,7 +89,7 @@ def _noise(results: Any) -> Judgement:
     doubts = [*([CATALOGUE["W-EXCITATION"].words] if any(map(is_bound, levels)) else []), *marks.words]
     rests_on = estimates_words(results.findings)
     resonances_known = "runup" in results.stages or "modes" in results.stages
-    open_words = no_limit_words(limits, resonances_known, resonance)
+    open_words = no_limit_words(limit_entry, resonances_known)
     return judge_noise(answer, sentence, resonance, open_words, margins, doubt_words(doubts), rests_on)
 
 
@@ -159,8 +159,10 @@ def _resonance(results: Any, loudest_speed: float, mesh_frequency: float) -> tup
     mode, harmonic = int(runup["mode"].values[at]), int(runup["mesh_harmonic"].values[at])
     speed, share = float(speeds[at]), float(makes[at]) ** 2
     power = f"makes {percent(share)} of the power" if share < 1.0 else "alone is as loud as all lines together"
+    in_short = power.removeprefix("makes ").replace("alone is", "alone")
     meeting = f"mesh harmonic {harmonic} meets mode {mode} at {speed * (1.0 + 0.01 * distance[at]):,.4g} rpm"
-    card = f"{meeting}, which {power} at {speed:,.4g} rpm"
+    card = f"{meeting}: {in_short}"
+    card += "" if np.isclose(speed, loudest_speed) else f" at {speed:,.4g} rpm"  # the level beside it is of that speed
     if not at_loudest.any():
         return card, ""
     kind = f" ({results.modes['kind'].values[mode - 1]})" if "modes" in results.stages else ""

@@ -245,7 +245,7 @@ def _noise(results: Any) -> Judgement:
         sentence += f"; the largest part comes by {main_way(data, sensor)}"
     if "runup" in results.stages and "level" in results.runup:
         sentence += f". Largest of the run-up: {_loudest_of_run_up(results.runup, marks, name)}"
-    open_words = no_limit_words("sensor.level_limit", modes is not None, resonance)
+    open_words = no_limit_words("sensor.level_limit", modes is not None)
     margins = tuple(_margins(results))
     rests_on = estimates_words(results.findings)
     return judge_noise(answer, sentence, resonance, open_words, margins, doubt_words(marks.words), rests_on)
