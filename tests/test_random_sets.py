@@ -440,8 +440,8 @@ def converged_in_positions(solved):
     for name, still in (("deflection", 1e-3), ("stiffness", 1e-3), ("load_share", 0.1)):
         values, size = finer.peak_to_peak(name), still * np.abs(np.asarray(getattr(finer, name))).max()
         change = np.abs(cycle.peak_to_peak(name) - values) / np.maximum(values, size)
-        told = name == "stiffness" and solved.warned("W-RIPPLE", "static")
-        assert told or change.max() < POSITIONS, (name, change)
+        warned = name == "stiffness" and solved.warned("W-RIPPLE", "static")
+        assert warned or change.max() < POSITIONS, (name, change)
     assert off(cycle.mean(), finer.mean()) < POSITIONS
     assert off(cycle.load_share.mean(axis=1), finer.load_share.mean(axis=1)) < POSITIONS
 
@@ -492,7 +492,7 @@ KNOWN = {
         similar_in_length,
     ): "another interval is halved: peaks of stiffness differ by 4.4e-4, of 1 % that are promised",
 }
-"""What does not hold, with the reason: it fails where it holds again."""
+"""Invariants that a set does not keep, with the reason; a test fails as soon as the set keeps one again."""
 
 
 def marks_of(seed: int, invariant) -> list[pytest.MarkDecorator]:

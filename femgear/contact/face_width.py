@@ -266,24 +266,22 @@ def over_slices(record, ahead: np.ndarray, *, periods: int = 1) -> dict[str, np.
 
 
 def ripple_doubt(record: Any, ahead: np.ndarray, *, periods: int = 1) -> float:
-    """Estimate the share of a peak to peak by which twice the positions change the mesh stiffness of helical teeth.
+    """Find by what share of its peak to peak half of the positions change the mesh stiffness of helical teeth.
 
-    It is half of what every other position changes: where slices come into contact one after the other the stiffness
-    jumps, and the error of equidistant positions goes down as their distance. Record and ``ahead``
-    (slices,) are those of `over_slices`, whose means are taken of all positions and of every other one.
+    Where slices come into contact one after the other the stiffness jumps, and the error of equidistant positions goes
+    down as their distance: what half of them change is about as large as what all of them still miss. Of a record and
+    ``ahead`` (slices,) as for `over_slices`, by whose means the curves of all positions and of every other one differ
+    at the same places. Peaks to peaks alone may agree by chance.
     """
-    count = len(record.position)
+    count, whole = len(record.position), _mean_of_steps(record.stiffness, ahead, periods)
     # of an odd number of positions every other one comes back after two rounds
-    chosen = [np.arange(first, count, 2) for first in (0, 1)] if count % 2 == 0 else [2 * np.arange(count) % count]
-    whole = np.ptp(_mean_of_steps(record.stiffness, ahead, periods), axis=-1)
-    steady = whole <= 1e-3 * np.abs(record.stiffness).max(axis=-1, initial=0.0)
-    change = 0.0
-    for positions in chosen:
-        rounds = periods * (1 if count % 2 == 0 else 2)
-        halved = np.ptp(_mean_of_steps(record.stiffness[:, positions], ahead, rounds), axis=-1)
-        shares = np.divide(halved, whole, out=np.ones(len(whole)), where=~steady)
-        change = max(change, float(np.abs(shares - 1.0).max()))
-    return 0.5 * change
+    rounds, chosen = (2 * periods, [2 * np.arange(count) % count])
+    if count % 2 == 0:
+        rounds, chosen = periods, [np.arange(first, count, 2) for first in (0, 1)]
+    apart = [_mean_of_steps(record.stiffness[:, half], ahead, rounds) - whole[:, half] for half in chosen]
+    size = np.maximum(np.ptp(whole, axis=-1), 1e-3 * np.abs(record.stiffness).max(axis=-1, initial=0.0))
+    largest = np.max([np.abs(change).max(axis=-1) for change in apart], axis=0)
+    return float(np.divide(largest, size, out=np.zeros(len(size)), where=size > 0.0).max(initial=0.0))
 
 
 def _mean_of_steps(values: np.ndarray, ahead: np.ndarray, periods: int) -> np.ndarray:

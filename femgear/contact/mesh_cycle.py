@@ -147,8 +147,8 @@ class MeshCycle:
         Force of gear 1 on gear 2 along the tangent, positive as flank 1 moves there while gear 1 drives [N], and the
         sum of the same times the path coordinates of the tooth pairs, as the flanks that are loaded drive [N m].
     ripple_doubt : float
-        Of helical teeth in slices: share of its peak to peak by which twice the positions may change a mesh stiffness,
-        as `femgear.contact.face_width.ripple_doubt` estimates it.
+        Of helical teeth in slices: share of its peak to peak by which half of the positions change a mesh stiffness,
+        see `femgear.contact.face_width.ripple_doubt`.
     """
 
     position: np.ndarray

@@ -769,8 +769,8 @@ def static_warnings(data: xr.Dataset) -> Iterator[Finding]:
         yield Finding("W-POSITIONS", "static.positions", reach, remedy="take more positions")
     if (ripple := data.attrs.get("ripple_doubt", 0.0)) > LARGEST_PEAK_DOUBT:
         text = (
-            f"twice the positions may change the peak to peak of the mesh stiffness by {percent(ripple)}, as slices "
-            "of helical teeth come into contact one after the other"
+            f"half of the positions change the mesh stiffness by {percent(ripple)} of its peak to peak, as slices of "
+            "helical teeth come into contact one after the other: more of them may change it too"
         )
         yield Finding("W-RIPPLE", "static.positions", text, remedy="take more positions")
     if ((force > 0) & (pressure <= 0)).any():

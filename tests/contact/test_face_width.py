@@ -9,7 +9,7 @@ from trains.pair.test_case_file import pair_case
 
 from femgear.case.gear_set import planetary_set
 from femgear.contact import face_width
-from femgear.contact.face_width import ripple_doubt, slices_ahead
+from femgear.contact.face_width import over_slices, ripple_doubt, slices_ahead
 from femgear.stages.static import record_positions, solve_static
 from validation.reference.hertz import cell_influence
 
@@ -133,21 +133,23 @@ def test_positions_of_a_helix_meet_slices_alike(angle, wanted, expected):
     assert record_positions(case, planetary_set(case)) == expected
 
 
-def test_half_of_what_every_other_position_changes_is_the_doubt_of_the_ripple():
-    """A stiffness of one slice after the other, whose jumps lie where they please."""
-    count, ahead = 24, slices_ahead(1.3, 11)
+@pytest.mark.parametrize(("overlap", "slices"), [(1.3, 11), (0.8, 9), (2.15, 25)])
+def test_the_doubt_of_the_ripple_covers_what_positions_miss(overlap, slices):
+    """A stiffness whose jumps pass one slice after the other, beside the same one at 64 times the positions."""
+    ahead, misses, doubts = slices_ahead(overlap, slices), [], []
 
-    def stiffness(position):
-        turned = np.mod(position[:, None] + ahead + 0.013, 1.0)
-        return (1.0 + 0.5 * (turned < 0.37) + 0.2 * turned).mean(axis=1)[None] * 1e8
+    def record(count, start):
+        position = np.arange(count) / count
+        turned = np.mod(position[:, None] + ahead + start, 1.0)
+        stiffness = (1.0 + 0.5 * (turned < 0.37) + 0.2 * turned).mean(axis=1)[None] * 1e8
+        return SimpleNamespace(position=position, stiffness=stiffness, force=np.ones((1, count)))
 
-    def estimate(count):
-        return ripple_doubt(
-            SimpleNamespace(position=np.arange(count), stiffness=stiffness(np.arange(count) / count)), ahead
-        )
-
-    found = estimate(count)
-    assert found > 0.0
-    for odd in (count + 1, 3 * count + 1):
-        assert estimate(odd) > 0.0
-    assert estimate(64 * count) < 0.1 * found
+    # three positions or more while one slice follows another, as `record_positions` takes them
+    for count in (round(part * slices / overlap) for part in (3.0, 4.4, 7.1, 7.7, 10.3)):
+        for start in np.linspace(0.0, 1.0 / count, 7, endpoint=False):
+            seen, exact = (np.ptp(over_slices(record(n, start), ahead)["stiffness"]) for n in (count, 64 * count))
+            misses.append(abs(seen / exact - 1.0))
+            doubts.append(ripple_doubt(record(count, start), ahead))
+    assert max(misses) > 0.05
+    assert (np.array(misses) <= 1.5 * np.array(doubts)).all()
+    assert ripple_doubt(record(64 * 24, 0.013), ahead) < 0.1 * max(doubts)

@@ -158,10 +158,10 @@ def _resonance(results: Any, loudest_speed: float, mesh_frequency: float) -> tup
     at = int((at_loudest if at_loudest.any() else makes).argmax())
     mode, harmonic = int(runup["mode"].values[at]), int(runup["mesh_harmonic"].values[at])
     speed, share = float(speeds[at]), float(makes[at]) ** 2
-    power = f"makes {percent(share)} of the power" if share < 1.0 else "alone is as loud as all lines together"
-    in_short = power.removeprefix("makes ").replace("alone is", "alone")
+    part = f"{percent(share)} of the power" if share < 1.0 else "as loud as all lines together"
+    power = f"makes {part}" if share < 1.0 else f"alone is {part}"
     meeting = f"mesh harmonic {harmonic} meets mode {mode} at {speed * (1.0 + 0.01 * distance[at]):,.4g} rpm"
-    card = f"{meeting}: {in_short}"
+    card = f"{meeting}: {part}"
     card += "" if np.isclose(speed, loudest_speed) else f" at {speed:,.4g} rpm"  # the level beside it is of that speed
     if not at_loudest.any():
         return card, ""

@@ -471,33 +471,32 @@ def _compared_to(data: xr.Dataset) -> str:
 
 
 def _cross_finding(data: xr.Dataset) -> Finding:
-    """Tell what a stage after the other leaves out most, and what that is of mesh forces and levels (W-CROSS)."""
+    """Tell what a stage after the other leaves out most, and what that is of mesh forces and levels (W-CROSS).
+
+    Where it changes a force or a level by what one reads, the place where it changes them most; elsewhere a note of
+    the largest share of a dynamic force.
+    """
     cross, names = data["cross_excitation"].values, data["stage"].values
-    speed, first, second = np.unravel_index(int(cross.argmax()), cross.shape)
-    largest, stage = cross.max(), int(first)
-    of_mean = largest * np.nanmax((data["mesh_force_rms"] / data["mean_force"]).values[speed, stage])
+    with np.errstate(divide="ignore", invalid="ignore"):
+        dynamic = np.nan_to_num((data["mesh_force_rms"] / data["mean_force"]).values).max(axis=2)  # (speed, stage)
+        share = np.zeros((len(cross), 1, len(names)))  # (speed, sensor, stage)
+        if "level_of_stage" in data:
+            share = np.nan_to_num(data["level_of_stage"].values / data["level"].values[:, :, None])
+    effect = np.maximum(dynamic / _CROSS_READ, share.max(axis=1, initial=0.0) / _CROSS_HEARD)
+    change = np.where(cross > _CROSS, cross, 0.0) * effect[:, :, None]
+    severity = "" if change.max() > 1.0 else NOTE
+    most = cross if severity else change
+    speed, stage, other = np.unravel_index(int(most.argmax()), most.shape)
+    largest = cross[speed, stage, other]
     text = (
-        f"the stiffness of {names[first]} on the motion by {names[second]} makes {percent(largest)} of its dynamic "
-        f"force at {data['speed'].values[speed]:.5g} rpm, and is left out: {of_mean:.2g} of its mean force"
+        f"the stiffness of {names[stage]} on the motion by {names[other]} makes {percent(largest)} of its dynamic "
+        f"force at {data['speed'].values[speed]:.5g} rpm, and is left out: {largest * dynamic[speed, stage]:.2g} of "
+        "its mean force"
     )
     if "level_of_stage" in data:
-        share = data["level_of_stage"].values[speed, :, stage] / data["level"].values[speed]
-        text += f", {largest * np.nanmax(share):.2g} of the level at {data['sensor'].values[int(np.nanargmax(share))]}"
-    severity = "" if _cross_matters(data) else NOTE
+        sensor = int(share[speed, :, stage].argmax())
+        text += f", {largest * share[speed, sensor, stage]:.2g} of the level at {data['sensor'].values[sensor]}"
     return Finding("W-CROSS", "", text, limit=percent(_CROSS), severity=severity)
-
-
-def _cross_matters(data: xr.Dataset) -> bool:
-    """Tell whether what a stage after the other leaves out changes a mesh force or a level by what one reads."""
-    cross, dynamic = data["cross_excitation"].values, (data["mesh_force_rms"] / data["mean_force"]).values
-    left_out = np.where(cross > _CROSS, cross, 0.0).max(axis=2)  # (speed, stage)
-    of_mean = left_out * np.nan_to_num(dynamic, nan=0.0).max(axis=2)
-    if of_mean.max() > _CROSS_READ:
-        return True
-    if "level_of_stage" not in data:
-        return False
-    share = data["level_of_stage"].values / data["level"].values[:, :, None]  # (speed, sensor, stage)
-    return bool((left_out[:, None] * np.nan_to_num(share)).max(initial=0.0) > _CROSS_HEARD)
 
 
 def _of_speeds(speeds: np.ndarray, chosen: np.ndarray) -> str:

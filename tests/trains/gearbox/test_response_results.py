@@ -221,3 +221,27 @@ def test_a_carrier_that_stands_is_said_to_make_no_side_bands(fixed):
     # lines beside mesh harmonics
     harmonics = data["order"].values / data["order"].values[data["harmonic"].values == 1].min()
     assert bool(np.allclose(harmonics, np.rint(harmonics))) is stands
+
+
+def test_of_stages_that_change_one_another_the_change_that_one_reads_is_told():
+    """30 % of the force of a stage that hardly moves beside 8 % of one whose force varies by a fifth of its mean."""
+    cross = np.zeros((1, 3, 3))
+    cross[0, 2, 0], cross[0, 0, 1] = 0.3, 0.08
+    forces = ("speed", "stage", "kind")
+    data = xr.Dataset(
+        {
+            "lowest_force": (forces, np.ones((1, 3, 1))),
+            "outer": (("speed", "stage"), np.zeros((1, 3))),
+            "cross_excitation": (("speed", "stage", "other_stage"), cross),
+            "mesh_force_rms": (forces, [[[0.2], [0.1], [1e-5]]]),
+            "mean_force": (forces, np.ones((1, 3, 1))),
+        },
+        coords={"speed": [1500.0], "stage": ["first", "second", "third"], "other_stage": ["first", "second", "third"]},
+        attrs={"missing": "", "rigid": "", "up_to": 2e4},
+    )
+    (finding,) = gearbox_response_warnings(data)
+    assert finding.severity == DOUBT and "stiffness of first on the motion by second makes 8 %" in finding.text
+    assert "0.016 of its mean force" in finding.text
+    cross[0, 0, 1] = 0.0
+    (finding,) = gearbox_response_warnings(data.assign(cross_excitation=(("speed", "stage", "other_stage"), cross)))
+    assert finding.severity == NOTE and "stiffness of third on the motion by first makes 30 %" in finding.text
